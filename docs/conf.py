@@ -32,7 +32,10 @@ from tfarm.synthesis import design
 from tfarm.tuner import kernel as tuner_kernel
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE.parent)]  # `tables`; and `tests`, with the surveys that tables are measured by
+sys.path[:0] = [
+    str(HERE),
+    str(HERE.parent),
+]  # `tables`; and `tests`, with the surveys that tables are measured by
 
 from tables import markdown_table  # noqa: E402
 
@@ -71,11 +74,15 @@ nb_execution_mode = "cache"
 nb_execution_cache_path = str(HERE / "_build" / "notebooks" / hash_of_sources())
 nb_execution_in_temp = True
 nb_execution_timeout = 600  # seconds of a cell: kernels are compiled in some, on a slow machine
-nb_execution_raise_on_error = False  # a failed cell is a warning, for which the build fails after the other pages
+nb_execution_raise_on_error = (
+    False  # a failed cell is a warning, for which the build fails after the other pages
+)
 nb_execution_show_tb = True
 nb_output_stderr = "remove"  # progress and names of written files
 nb_merge_streams = True
-os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # the command tfarm, in notebooks
+os.environ["PATH"] = (
+    f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # the command tfarm, in notebooks
+)
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 os.environ["IPYTHONDIR"] = str(HERE / "_build" / "ipython")  # no profile of the user's own
 logging.getLogger("traitlets").setLevel(logging.WARNING)
@@ -141,11 +148,26 @@ def stages_table() -> list[str]:
         "loop has its verdict, its margins and its column of the card."
     )
     rows = (
-        [keys, *(consumer.word(stage.name) or "refused" for consumer in CONSUMERS)] for stage, keys in shown if keys
+        [keys, *(consumer.word(stage.name) or "refused" for consumer in CONSUMERS)]
+        for stage, keys in shown
+        if keys
     )
     words = markdown_table(("keys", *(consumer.name for consumer in CONSUMERS)), rows)
     intro = "What happens in one sample, in this order. A stage that an answer does not state is refused by its name."
-    return ["## Stages of one sample", "", intro, "", *head, "", "## Keys and answers", "", text, "", *words, ""]
+    return [
+        "## Stages of one sample",
+        "",
+        intro,
+        "",
+        *head,
+        "",
+        "## Keys and answers",
+        "",
+        text,
+        "",
+        *words,
+        "",
+    ]
 
 
 def materials_table() -> list[str]:
@@ -233,7 +255,9 @@ def check_figures(app: Any, error: Exception | None) -> None:
 
     for path in () if error else (HERE / "tutorials").glob("*.md"):
         drawn = path.read_text(encoding="utf-8").count("tfarm.plots.")
-        shown = (Path(app.outdir) / "tutorials" / f"{path.stem}.html").read_text(encoding="utf-8").count("<img ")
+        shown = (
+            (Path(app.outdir) / "tutorials" / f"{path.stem}.html").read_text(encoding="utf-8").count("<img ")
+        )
         if shown < drawn:
             raise ExtensionError(f"{path.name}: {drawn} figures are drawn, {shown} shown")
 

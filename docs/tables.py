@@ -53,7 +53,13 @@ def markdown_table(titles: Iterable[str], rows: Iterable[Iterable[str]]) -> list
 def grades() -> list[str]:
     """Limits of the grades of the result card, from the code that grades."""
     rows = [
-        ("gain margin, upwards and downwards", GAIN_LIMITS, "at least", "dB", "[2] section 6.4, [5] section 7-7"),
+        (
+            "gain margin, upwards and downwards",
+            GAIN_LIMITS,
+            "at least",
+            "dB",
+            "[2] section 6.4, [5] section 7-7",
+        ),
         ("phase margin", PHASE_LIMITS, "at least", "deg", "[2] section 6.4, [5] section 7-7"),
         ("delay margin", PERIOD_LIMITS, "at least", "sampling periods", "one more sample of computing time"),
         ("peak sensitivity Ms", PEAK_LIMITS, "at most", "", "[1] section 10.3, [3] section 2.4"),
@@ -79,7 +85,9 @@ def published() -> list[str]:
         largest = max(abs(row.difference) for row in of)
         rows.append([source.citation, str(len(of)), str(sum(row.agrees for row in of)), f"{largest:.1e}"])
     rows.append(["all", str(len(found.rows)), str(found.agree), ""])
-    return markdown_table(("source", "numbers", "agree to the last printed digit", "largest difference"), rows)
+    return markdown_table(
+        ("source", "numbers", "agree to the last printed digit", "largest difference"), rows
+    )
 
 
 @table
@@ -100,7 +108,13 @@ def audit() -> list[str]:
     lines = []
     for row in (rows := audited()):
         if row.verdict != "ok":
-            lines += [f"**{row.equation}**, {row.verdict}", "", "as printed", f": $$ {row.printed_tex} $$", ""]
+            lines += [
+                f"**{row.equation}**, {row.verdict}",
+                "",
+                "as printed",
+                f": $$ {row.printed_tex} $$",
+                "",
+            ]
             lines += ["as corrected", f": $$ {row.corrected_tex} $$", "", "check", f": {row.evidence}", ""]
     return [*lines, f"Right as printed: {', '.join(row.equation for row in rows if row.verdict == 'ok')}."]
 
@@ -138,12 +152,22 @@ def speed() -> list[str]:
         for each in kept["rows"]
     )  # fmt: skip
     versions = ", ".join(f"{name} {version}" for name, version in kept["versions"].items())
-    titles = ("computation", "number", "time of each", "random arms: median", "worst", "ratio", "largest error")
+    titles = (
+        "computation",
+        "number",
+        "time of each",
+        "random arms: median",
+        "worst",
+        "ratio",
+        "largest error",
+    )
     return [*markdown_table(titles, rows), "", f"Versions: {versions}."]
 
 
 def _time(seconds: float) -> str:
-    unit, scale = next(each for each in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)) if seconds >= each[1])
+    unit, scale = next(
+        each for each in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)) if seconds >= each[1]
+    )
     return f"{general(seconds / scale, 3)} {unit}"
 
 
@@ -158,9 +182,15 @@ def rig_laws() -> list[str]:
         step, end = run.step, run.reference[-1]
         shares = (overshoot(each, step, end) for each in (run.hub_angle, found.hub_angle))
         rows.append(
-            [name, tfarm.sampled(arm, law, chain).verdict.sentence, *(f"{100 * each:.1f} %" for each in shares)]
+            [
+                name,
+                tfarm.sampled(arm, law, chain).verdict.sentence,
+                *(f"{100 * each:.1f} %" for each in shares),
+            ]
         )
-    return markdown_table(("controller", "sampled loop", "overshoot, measured", "overshoot, exact loop"), rows)
+    return markdown_table(
+        ("controller", "sampled loop", "overshoot, measured", "overshoot, exact loop"), rows
+    )
 
 
 @table
@@ -197,10 +227,18 @@ def presets() -> list[str]:
     """The arms that come with the package, and what each assumes."""
     arms = [tfarm.load(name) for name in tfarm.presets()]
     rows = (
-        [f"`{arm.name}`", f"{arm.length:g}", f"{arm.damping:g}", f"{arm.hub.inertia:g}", f"{arm.payload.mass:g}"]
+        [
+            f"`{arm.name}`",
+            f"{arm.length:g}",
+            f"{arm.damping:g}",
+            f"{arm.hub.inertia:g}",
+            f"{arm.payload.mass:g}",
+        ]
         for arm in arms
     )
-    lines = markdown_table(("name", "length [m]", "damping C [s]", "hub inertia [kg m²]", "payload [kg]"), rows)
+    lines = markdown_table(
+        ("name", "length [m]", "damping C [s]", "hub inertia [kg m²]", "payload [kg]"), rows
+    )
     for arm in arms:
         lines += ["", f"**{arm.name}**", "", *(f"* {each}" for each in arm.assumptions)]
     return lines

@@ -29,5 +29,7 @@ assert law is not None  # None of a file without [law]
 print(f"damping {100 * chosen.value:.4g} %;", tfarm.sampled(arm, law).verdict.sentence)
 print("on the rig itself:", tfarm.sampled(bench, law).verdict.word)
 
-made = tfarm.export(arm, law, what="loop", form="mat", folder="matlab")  # load_loop.m is for MATLAB and Octave
+made = tfarm.export(
+    arm, law, what="loop", form="mat", folder="matlab"
+)  # load_loop.m is for MATLAB and Octave
 print(f"written: {', '.join(made.files)}; the loop is {made.verdict}")

@@ -38,7 +38,9 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module 'tfarm' has no attribute {name!r}")
     module, own = _PLACES[name]
     is_room = module == "tfarm"
-    value = globals()[name] = import_module(f"tfarm.{own}") if is_room else getattr(import_module(module), own)
+    value = globals()[name] = (
+        import_module(f"tfarm.{own}") if is_room else getattr(import_module(module), own)
+    )
     return value
 
 

@@ -9,5 +9,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Whole = NDArray[np.int64]
 
-LEAST_SIZE = 1e-300  # in place of 0 in a denominator or logarithm
-MACHINE_EPS = float(np.finfo(float).eps)  # of a double, to be multiplied by counts of operations
+# in place of 0 in a denominator or logarithm
+LEAST_SIZE = 1e-300
+# of a double, to be multiplied by counts of operations
+MACHINE_EPS = float(np.finfo(float).eps)

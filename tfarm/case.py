@@ -132,7 +132,9 @@ def full_law(law: AnyLaw) -> Law:
     if law.gains is None:
         return law
     references = AT_HUB if _follows_all(law) else law.references
-    return Law({gain.output: law.gains[gain.name] for gain in GAINS}, name="gains at the hub", references=references)
+    return Law(
+        {gain.output: law.gains[gain.name] for gain in GAINS}, name="gains at the hub", references=references
+    )
 
 
 def tracked(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:

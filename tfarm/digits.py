@@ -7,11 +7,11 @@ from functools import partial
 from typing import Any
 
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-DOUBLE_DIGITS = 15  # of a decimal number that a double preserves
+# of a decimal number that a double preserves
+DOUBLE_DIGITS = 15
 # outside, numbers have powers of ten
-LEAST_PLAIN = 1e-3
-MOST_PLAIN = 1e7
-CellsOf = Callable[[Sequence[Any]], Sequence[str]]  # from the values of a column to its cells
+# from the values of a column to its cells
+CellsOf = Callable[[Sequence[Any]], Sequence[str]]
 
 
 def singly(how: Callable[..., str], *digits: int) -> CellsOf:
@@ -24,7 +24,8 @@ def column_format(digits: int, least: int) -> CellsOf:
     return partial(align_decimals, digits=digits, least=least)
 
 
-TEXTS = singly(str)  # words and whole numbers as they are
+# words and whole numbers as they are
+TEXTS = singly(str)
 
 
 def general(x: float, digits: int) -> str:
@@ -34,7 +35,10 @@ def general(x: float, digits: int) -> str:
 
 def significant(x: float, digits: int) -> str:
     """Return `x` with exactly `digits` significant digits: 71.505682, 1.800 × 10⁻⁹."""
-    if x and not LEAST_PLAIN <= abs(x) < MOST_PLAIN:
+    # outside, numbers have powers of ten
+    least_plain = 1e-3
+    most_plain = 1e7
+    if x and not least_plain <= abs(x) < most_plain:
         return scientific(x, digits)
     return _typeset(f"{x:.{max(0, digits - 1 - _exponent(x, digits))}f}") if x else "0"
 

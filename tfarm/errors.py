@@ -8,7 +8,8 @@ from functools import partial
 from itertools import accumulate
 from typing import Any, Self
 
-MISSING = ...  # the value of a missing key
+# the value of a missing key
+MISSING = ...
 
 
 class TfarmError(Exception):
@@ -18,7 +19,9 @@ class TfarmError(Exception):
 class ParameterError(TfarmError, ValueError):
     """Bad input.  Its text is one line: the file (if any), the key, the value and the remedy."""
 
-    def __init__(self, *, key: str, value: object, remedy: str, file: str | os.PathLike[str] | None = None) -> None:
+    def __init__(
+        self, *, key: str, value: object, remedy: str, file: str | os.PathLike[str] | None = None
+    ) -> None:
         self.key = key
         self.value = value
         self.remedy = remedy
@@ -137,5 +140,6 @@ def short_text(value: object) -> str:
         return f"[{list_within((one_line(repr(each), 50) for each in value), 58)}]"
     try:
         return one_line(repr(value), 60)
-    except (ValueError, RecursionError):  # an integer of more than 4300 digits, a very deep table
+    except (ValueError, RecursionError):
+        # an integer of more than 4300 digits, a very deep table
         return f"<{type(value).__name__}>"

@@ -25,7 +25,8 @@ from tfarm.stopping import undone_if_stopped
 if sys.platform != "win32":
     import fcntl
 
-STANDARD_OUTPUT = "-"  # in the place of a path, as other programs have it; a file of that name is written as a/-
+# in the place of a path, as other programs have it; a file of that name is written as a/-
+STANDARD_OUTPUT = "-"
 UNREADABLE = "cannot be read ({}); check the path and its permissions"
 
 
@@ -36,7 +37,8 @@ def read_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -
     """
     with open_file(path, most, key=key, what=what) as file, _refused(key, path, UNREADABLE):
         data = file.read(most + 1)
-    _check_size(path, len(data), most, what)  # of a file that grows, or that has no size
+    # of a file that grows, or that has no size
+    _check_size(path, len(data), most, what)
     return data
 
 
@@ -73,7 +75,8 @@ def mat_content(variables: Mapping[str, Any], oned_as: Literal["row", "column"])
 
     content = io.BytesIO()
     savemat(cast("Any", content), dict(variables), oned_as=oned_as)
-    size = 116  # bytes of text that a MAT-file begins with, before its version
+    # bytes of text that a MAT-file begins with, before its version
+    size = 116
     return b"MATLAB 5.0 MAT-file, written by tfarm".ljust(size) + content.getvalue()[size:]
 
 
@@ -89,7 +92,9 @@ def write_file(path: Path, content: bytes, *, key: str) -> None:
             _replace(Path(os.path.realpath(path)), content)
             return
         # a pipe without a reader, and a folder, raise OSError at once
-        handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0)) if number is None else os.dup(number)
+        handle = (
+            os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0)) if number is None else os.dup(number)
+        )
         os.set_blocking(handle, True)
         with os.fdopen(handle, "wb") as file:
             file.write(content)
@@ -117,20 +122,25 @@ def place_in(out: Path, key: str, names: Sequence[str] = ()) -> Iterator[Path]:
     try:
         with _made(folders):
             for folder in folders:
-                with temporary_folder(folder):  # which fails where it cannot be written to
+                # which fails where it cannot be written to
+                with temporary_folder(folder):
                     pass
             with temporary_folder(out) as place:
                 yield place
     except OSError as error:
         raise ParameterError(
-            key=key, value=str(out), remedy=f"cannot be written to ({error.strerror or error}); give a folder that can"
+            key=key,
+            value=str(out),
+            remedy=f"cannot be written to ({error.strerror or error}); give a folder that can",
         ) from None
 
 
 @contextmanager
 def _made(folders: Sequence[Path]) -> Iterator[None]:
     """Make folders, of which those that are new and empty are removed afterwards, also where the process is stopped."""
-    missing = [part for folder in folders for part in (*reversed(folder.parents), folder) if not part.exists()]
+    missing = [
+        part for folder in folders for part in (*reversed(folder.parents), folder) if not part.exists()
+    ]
 
     def remove_empty() -> None:
         for folder in reversed(missing):
@@ -184,7 +194,8 @@ def _replace(path: Path, content: bytes) -> None:
     with _temporary(path.parent, f".{path.name[:40]}.", ".part", make) as temporary:
         temporary.write_bytes(content)
         if old is not None:
-            with suppress(OSError, AttributeError):  # AttributeError: of a system without owners
+            # AttributeError: of a system without owners
+            with suppress(OSError, AttributeError):
                 os.chown(temporary, old.st_uid, old.st_gid)
             temporary.chmod(stat.S_IMODE(old.st_mode))
         os.replace(temporary, path)
@@ -197,7 +208,8 @@ def _temporary(folder: Path, prefix: str, suffix: str, make: Callable[[Path], ob
     Others of such a name that are not locked go first: their writers are gone.
     """
     pattern = re.compile(f"{re.escape(prefix)}[0-9a-f]{{8}}{re.escape(suffix)}")
-    with suppress(PermissionError):  # of a folder that cannot be listed, and may yet be written to
+    # of a folder that cannot be listed, and may yet be written to
+    with suppress(PermissionError):
         for name in filter(pattern.fullmatch, os.listdir(folder)):
             with suppress(OSError), _locked(folder / name, wait=False):
                 _remove(folder / name)
@@ -224,7 +236,8 @@ def _locked(path: Path, *, wait: bool) -> Iterator[None]:
         handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW) if sys.platform != "win32" else None
     except FileNotFoundError:
         handle = None
-    if handle is None:  # on Windows: no such locks, but what is open cannot be removed either
+    # on Windows: no such locks, but what is open cannot be removed either
+    if handle is None:
         yield
         return
     try:
@@ -254,6 +267,7 @@ def locked_folder(path: Path, *, key: str) -> Iterator[None]:
 
 
 def _remove(path: Path) -> None:
-    shutil.rmtree(path, ignore_errors=True)  # of a folder alone, and not of a link to one
+    # of a folder alone, and not of a link to one
+    shutil.rmtree(path, ignore_errors=True)
     with suppress(OSError):
         path.unlink(missing_ok=True)

@@ -22,9 +22,11 @@ from tfarm.errors import ParameterError
 from tfarm.stopping import undone_if_stopped
 
 LONGEST = (
-    120  # seconds, of a file or a batch of rows: the largest file takes 8 s of a processor, which others may share
+    # seconds, of a file or a batch of rows: the largest file takes 8 s of a processor, which others may share
+    120
 )
-alarm: Callable[[int], object] = getattr(signal, "alarm", lambda _: None)  # the system's, where it has one
+# the system's, where it has one
+alarm: Callable[[int], object] = getattr(signal, "alarm", lambda _: None)
 
 
 @contextmanager
@@ -66,12 +68,15 @@ def of_mat(path: str) -> Iterator[memoryview]:
     from scipy.io import loadmat
 
     found = loadmat(path, appendmat=False, squeeze_me=False, struct_as_record=True)
-    return pack_arrays(dict(each for item in found.items() if item[0][:2] != "__" for each in _numbers(*item)))
+    return pack_arrays(
+        dict(each for item in found.items() if item[0][:2] != "__" for each in _numbers(*item))
+    )
 
 
 def _numbers(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     """Yield the dense arrays of a variable; none of a cell or an object."""
-    value = value.toarray() if hasattr(value, "toarray") else np.asarray(value)  # of a sparse matrix
+    # of a sparse matrix
+    value = value.toarray() if hasattr(value, "toarray") else np.asarray(value)
     for each in value.dtype.names or () if value.size == 1 else ():
         yield from _numbers(f"{name}.{each}", value[each].item())
     if value.dtype.kind in "biufcU":
@@ -104,7 +109,10 @@ def of_parquet(path: str) -> Iterator[bytes]:
     from pyarrow.parquet import ParquetFile  # type: ignore[import-untyped]
 
     with ParquetFile(path) as file:
-        batches = (zip(*(column.to_pylist() for column in batch.columns), strict=True) for batch in file.iter_batches())
+        batches = (
+            zip(*(column.to_pylist() for column in batch.columns), strict=True)
+            for batch in file.iter_batches()
+        )
         for rows in chain([[file.schema_arrow.names]], batches):
             csv.writer(text := io.StringIO()).writerows(rows)
             yield text.getvalue().encode()
@@ -115,17 +123,22 @@ READERS: dict[str, Callable[[str], Iterator[Any]]] = {"mat": of_mat, "uff": of_u
 
 def main(kind: str, path: str) -> None:
     """Write the content of a file to standard output; the last line of an error is its reason."""
-    with suppress(ImportError, ValueError, OSError):  # of a system without limits, or with a tighter one
+    # of a system without limits, or with a tighter one
+    with suppress(ImportError, ValueError, OSError):
         import resource
 
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # no file with the memory of a reader that crashed
-        most = 4 << 30  # bytes: a UFF file of 256 MiB, the largest that is read, takes 3.4e9
+        # no file with the memory of a reader that crashed
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        # bytes: a UFF file of 256 MiB, the largest that is read, takes 3.4e9
+        most = 4 << 30
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
     with open(os.dup(1), "wb") as output:
-        os.dup2(2, 1)  # a reader may print
+        # a reader may print
+        os.dup2(2, 1)
         alarm(LONGEST)
         for each in READERS[kind](path):
-            alarm(0)  # while it waits to be taken
+            # while it waits to be taken
+            alarm(0)
             output.write(each)
             alarm(LONGEST)
 

@@ -41,7 +41,8 @@ def share_tasks(
             begun([task])
             yield task, call()
         return
-    waiting = iter(tasks)  # which may make each task only when there is a process for it
+    # which may make each task only when there is a process for it
+    waiting = iter(tasks)
     running: dict[Future[Result], Task] = {}
     others = count - joins
     with _pool(others) as pool:
@@ -55,7 +56,8 @@ def share_tasks(
         while True:
             begin(others)
             own = next(waiting, None) if joins else None
-            begin(count)  # one more, for a process that ends its task before this one does
+            # one more, for a process that ends its task before this one does
+            begin(count)
             if own is None and not running:
                 return
             begun([*running.values()][:others] + ([] if own is None else [own[0]]))
@@ -80,19 +82,25 @@ def _pool(count: int) -> Iterator[ProcessPoolExecutor]:
             child.kill()
             child.join()
 
-    with _entry(os.environ, "PYTHONWARNINGS", "ignore:resource_tracker"):  # of semaphores of a stopped process
+    # of semaphores of a stopped process
+    with _entry(os.environ, "PYTHONWARNINGS", "ignore:resource_tracker"):
         resource_tracker.ensure_running()
     with (
         _entry(os.environ, BLAS, os.environ.get(BLAS, "1")),
         undone_if_stopped(kill),
-        ProcessPoolExecutor(count, get_context("spawn"), initializer=_begin, initargs=gc.get_threshold()) as pool,
+        ProcessPoolExecutor(
+            count, get_context("spawn"), initializer=_begin, initargs=gc.get_threshold()
+        ) as pool,
     ):
         try:
             yield pool
         except BrokenProcessPool:
-            kill()  # one that never began its work would be waited for
+            # one that never began its work would be waited for
+            kill()
             raise ConvergenceError(
-                "a worker process ended before its work was done, perhaps for want of memory; ask for less", None, None
+                "a worker process ended before its work was done, perhaps for want of memory; ask for less",
+                None,
+                None,
             ) from None
         except KeyboardInterrupt:
             kill()
@@ -130,7 +138,8 @@ def _begin(*thresholds: int) -> None:
 
 def leave_with_parent() -> None:
     """End a worker when the process that started it is gone: it would wait for work for ever."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for that process
+    # Ctrl-C is for that process
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
 
     def leave() -> None:

@@ -16,10 +16,14 @@ import numpy as np
 _Class = TypeVar("_Class", bound=type[Any])
 _AnyRecord = TypeVar("_AnyRecord")
 
-SHOWN_FIRST = ("verdict", "word", "text", "finding", "unstable", "worst_error")  # the finding
-LONGEST_REPR = 200  # characters of a repr: a line or two of a terminal
-PLAIN = frozenset({float, int, str, bool, type(None), Fraction})  # types without arrays
-OF_TEXTS = hash("tfarm")  # another in each process, as the hash of every record with a text
+# the finding
+SHOWN_FIRST = ("verdict", "word", "text", "finding", "unstable", "worst_error")
+# characters of a repr: a line or two of a terminal
+LONGEST_REPR = 200
+# types without arrays
+PLAIN = frozenset({float, int, str, bool, type(None), Fraction})
+# another in each process, as the hash of every record with a text
+OF_TEXTS = hash("tfarm")
 
 
 def record(cls: _Class) -> _Class:
@@ -57,7 +61,9 @@ def frozen(cls: type[_AnyRecord], /) -> type[_AnyRecord]: ...
 
 
 @overload
-def frozen(*, kw_only: bool = False, slots: bool = False) -> Callable[[type[_AnyRecord]], type[_AnyRecord]]: ...
+def frozen(
+    *, kw_only: bool = False, slots: bool = False
+) -> Callable[[type[_AnyRecord]], type[_AnyRecord]]: ...
 
 
 @dataclass_transform(frozen_default=True)
@@ -93,7 +99,9 @@ def _read_only_result(function: Any) -> Any:
 def _equal(self: Any, other: Any) -> Any:
     if type(self) is not type(other):
         return NotImplemented
-    return all(_same(getattr(self, each.name), getattr(other, each.name)) for each in fields(self) if each.compare)
+    return all(
+        _same(getattr(self, each.name), getattr(other, each.name)) for each in fields(self) if each.compare
+    )
 
 
 def _same(one: Any, other: Any) -> bool:
@@ -169,7 +177,8 @@ def _found(self: Any) -> list[str]:
 
 def _shown(value: Any, longest: int = 60) -> str:
     """Return an entry in a few characters: six digits of a number, an array's shape; a record's finding or name."""
-    few = 3  # numbers of an array or a list that are shown
+    # numbers of an array or a list that are shown
+    few = 3
     if isinstance(value, np.ndarray):
         is_short = value.ndim == 1 and value.size <= few
         return f"[{', '.join(map(_shown, value.tolist()))}]" if is_short else f"<array {value.shape}>"
@@ -177,7 +186,9 @@ def _shown(value: Any, longest: int = 60) -> str:
         return f"{value:.6g}"
     if isinstance(value, dict):
         is_short = 0 < len(value) <= few and all(isinstance(each, float) for each in value.values())
-        return f"<{', '.join(f'{key}={_shown(each)}' if is_short else str(key) for key, each in value.items())}>"
+        return (
+            f"<{', '.join(f'{key}={_shown(each)}' if is_short else str(key) for key, each in value.items())}>"
+        )
     if isinstance(value, tuple | list):
         return f"({', '.join(map(_shown, value)) if len(value) <= few else f'{len(value)} entries'})"
     if is_dataclass(value) and not isinstance(value, type):

@@ -17,7 +17,8 @@ from types import FrameType
 # what a long computation calls between its steps, with the number done, that of all, and what runs next
 Progress = Callable[[int, int, str], object]
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-PATIENCE = 0.5  # seconds that the main thread has before the second thread ends the process
+# seconds that the main thread has before the second thread ends the process
+PATIENCE = 0.5
 
 _undone: list[Callable[[], object]] = []
 _stopping = Lock()

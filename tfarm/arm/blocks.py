@@ -22,7 +22,8 @@ from tfarm.records import frozen
 
 Matrices = tuple[Real, Real, Real, Real]
 
-MOST_DEGREE = 60  # of one part: beyond it rounding of the coefficients moves the roots
+# of one part: beyond it rounding of the coefficients moves the roots
+MOST_DEGREE = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +116,8 @@ class StateSpace:
     B: Real
     C: Real
     D: Real
-    is_constant = False  # a name of Rational's, though without states it may be
+    # a name of Rational's, though without states it may be
+    is_constant = False
 
     def __post_init__(self) -> None:
         for name in "ABCD":
@@ -126,7 +128,8 @@ class StateSpace:
             require(found.ndim == 2 and np.isfinite(found).all(), name, "matrix", "rows of finite numbers")
             object.__setattr__(self, name, found)
         m = self.D.shape[1]
-        if not self.A.size:  # without states
+        # without states
+        if not self.A.size:
             object.__setattr__(self, "A", np.empty((0, 0)))
             object.__setattr__(self, "B", np.empty((0, m)))
         n = len(self.A)
@@ -167,7 +170,8 @@ class StateSpace:
         bordered[..., :n, :n] = s[..., None, None] * np.eye(n) - self.A
         bordered[..., n, :n] = -self.C
         found = np.zeros((self.signals, *np.shape(s)), complex)
-        for j in np.flatnonzero(self.B.any(axis=0) | self.D.any(axis=0)):  # an empty column has 0
+        # an empty column has 0
+        for j in np.flatnonzero(self.B.any(axis=0) | self.D.any(axis=0)):
             bordered[..., :n, n] = self.B[:, j]
             bordered[..., n, n] = self.D[0, j]
             found[j] = np.linalg.det(bordered)
@@ -206,11 +210,13 @@ def block_of(key: str, entry: Any) -> tuple[LawBlock, float | None]:
     """
     if isinstance(entry, Rational | StateSpace):
         return entry, None
-    dt = getattr(entry, "dt", None)  # python-control's: 0 of a continuous-time system, True of an unspecified period
+    # python-control's: 0 of a continuous-time system, True of an unspecified period
+    dt = getattr(entry, "dt", None)
     period = None if dt is None or dt is True or dt == 0 else float(dt)
     if all(hasattr(entry, name) for name in "ABCD"):
         system = StateSpace(*(getattr(entry, name) for name in "ABCD"))
-        if hasattr(entry, "poles"):  # python-control's, with states of any size
+        # python-control's, with states of any size
+        if hasattr(entry, "poles"):
             system = StateSpace(*balance_states(*system.matrices()))
         return system, period
     if hasattr(entry, "num") and hasattr(entry, "den"):
@@ -239,7 +245,8 @@ def balance_states(A: Real, B: Real, C: Real, D: Real) -> Matrices:
         return A, B, C, D
     from scipy.linalg import matrix_balance
 
-    with np.errstate(invalid="ignore"):  # SciPy also casts the scales to an unused permutation
+    # SciPy also casts the scales to an unused permutation
+    with np.errstate(invalid="ignore"):
         balanced_A, (scale, _) = matrix_balance(A, permute=False, separate=True)
     return np.asarray(balanced_A), B / scale[:, None], C * scale, D
 
@@ -250,8 +257,11 @@ def _polynomial(name: str, values: Any) -> tuple[float, ...]:
     is_row = isinstance(values, Sequence | np.ndarray) and not isinstance(values, str)
     require(is_row and len(values), name, values, remedy)
     found = [number(name, each, remedy) for each in values]
-    most = 1e150  # the square of one is still a double
-    require(all(abs(each) <= most for each in found), name, found, f"finite numbers, at most {most:g} in size")
+    # the square of one is still a double
+    most = 1e150
+    require(
+        all(abs(each) <= most for each in found), name, found, f"finite numbers, at most {most:g} in size"
+    )
     while len(found) > 1 and found[0] == 0:
         found.pop(0)
     require(len(found) <= MOST_DEGREE + 1, name, len(found) - 1, f"a degree of at most {MOST_DEGREE}")
@@ -261,7 +271,10 @@ def _polynomial(name: str, values: Any) -> tuple[float, ...]:
 def _of_roots(name: str, roots: ArrayLike) -> Real:
     """Return the monic real polynomial with these roots, (re, im) pairs or complex numbers, with their conjugates."""
     try:
-        found = np.array([complex(*each) if isinstance(each, tuple | list) else complex(each) for each in list(roots)])  # type: ignore[arg-type]
+        each_root: list[Any] = list(roots)  # type: ignore[arg-type]
+        found = np.array(
+            [complex(*each) if isinstance(each, tuple | list) else complex(each) for each in each_root]
+        )
     except (TypeError, ValueError):
         remedy = "numbers, complex ones as [re, im], with their conjugates"
         raise ParameterError(key=name, value=roots, remedy=remedy) from None

@@ -10,7 +10,15 @@ from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, Literal
 
 from tfarm.arm import schema
-from tfarm.arm.checks import above_zero, check_annotated, not_negative, number, positive, positive_if_given, whole
+from tfarm.arm.checks import (
+    above_zero,
+    check_annotated,
+    not_negative,
+    number,
+    positive,
+    positive_if_given,
+    whole,
+)
 from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.records import Arm
 from tfarm.arm.schema import ArmTable, TomlTable, validate_table
@@ -21,14 +29,15 @@ from tfarm.schema import Quantity
 
 MomentReading = Literal["vibration", "total"]
 # of a converter: of one bit there are no steps, of more than 32 no part
-LEAST_BITS = 2
-MOST_BITS = 32
-MOST_DELAY = 100.0  # samples: each whole one is a state more
+# samples: each whole one is a state more
+MOST_DELAY = 100.0
 DELAYS = "a computational delay is zero or positive, in samples, at most 100"
-TIME_ROUNDING = 1e-12  # of a time: by so little before a sample it is at it, as its quotient with the period is rounded
-PAPER_ANGLE = 1.15  # rad, as tip travel over length: the paper moves the tip of its 1 m by 1.15 m
+# of a time: by so little before a sample it is at it, as its quotient with the period is rounded
+TIME_ROUNDING = 1e-12
 PERIOD = Quantity("sampling period", "s", help="time between two samples of the controller")
-DELAY = Quantity("delay in samples", help="time from a sample to the torque computed from it, over the sampling period")
+DELAY = Quantity(
+    "delay in samples", help="time from a sample to the torque computed from it, over the sampling period"
+)
 OF_AN_ARM = (*ArmTable.model_fields, "law")
 
 
@@ -44,7 +53,9 @@ class Sampling:
         float, PERIOD, positive, "a sampling period is a positive, finite time in seconds, 0.01 for instance"
     ] = 0.01
     delay_samples: Annotated[float, DELAY, not_negative, DELAYS] = 0.0
-    antialias_corner: Annotated[float, above_zero, "a corner is positive in rad/s, or inf for no filter"] = math.inf
+    antialias_corner: Annotated[float, above_zero, "a corner is positive in rad/s, or inf for no filter"] = (
+        math.inf
+    )
 
     def __post_init__(self) -> None:
         check_annotated(self, "sampling")
@@ -100,15 +111,20 @@ class Converters:
     arithmetic: Literal["float64", "float32"] = "float64"
 
     def __post_init__(self) -> None:
+        # of a converter: of one bit there are no steps, of more than 32 no part
+        least_bits = 2
+        most_bits = 32
         _whole("converters.encoder_counts", self.encoder_counts, 2, 2**31, "counts a revolution")
         must_be_known("converters.hub_rate", self.hub_rate, ("ideal", "difference"))
         must_be_known("converters.arithmetic", self.arithmetic, ("float64", "float32"))
         check_annotated(self, "converters")
         for signal in ("moment", "torque"):
             bits = getattr(self, f"{signal}_bits")
-            _whole(f"converters.{signal}_bits", bits, LEAST_BITS, MOST_BITS, "bits")
+            _whole(f"converters.{signal}_bits", bits, least_bits, most_bits, "bits")
             remedy = f"{bits} bits need a range +-R: give it, or leave converters.{signal}_bits out"
-            require(bits is None or getattr(self, f"{signal}_range"), f"converters.{signal}_range", None, remedy)
+            require(
+                bits is None or getattr(self, f"{signal}_range"), f"converters.{signal}_range", None, remedy
+            )
 
     @property
     def is_single(self) -> bool:
@@ -162,7 +178,9 @@ class Slew:
 
     def travel_of(self, reach: float) -> float:
         """Tip travel [m] of an arm whose tip is so far [m] from the axis."""
-        return PAPER_ANGLE * reach if self.travel is None else self.travel
+        # rad, as tip travel over length: the paper moves the tip of its 1 m by 1.15 m
+        paper_angle = 1.15
+        return paper_angle * reach if self.travel is None else self.travel
 
     def acceleration(self, reach: float) -> float:
         """The hub's angular acceleration [rad/s^2] in the first half, 4 travel/(reach rise^2)."""
@@ -193,7 +211,9 @@ def chain_or_usual(chain: object) -> Chain:
     chain = Chain() if chain is None else chain
     if isinstance(chain, Chain):
         return chain
-    remedy = "give a tfarm.dsp.Chain, as tfarm.dsp.load_chain reads one; nothing for 10 ms and ideal converters"
+    remedy = (
+        "give a tfarm.dsp.Chain, as tfarm.dsp.load_chain reads one; nothing for 10 ms and ideal converters"
+    )
     raise ParameterError(key="chain", value=chain, remedy=remedy)
 
 
@@ -244,6 +264,8 @@ def file_text(arm: Arm, chain: Chain | None = None) -> str:
     """
     text = to_toml(arm)
     for table, given in stated_keys(chain or Chain()).items():
-        lines = [f"{key} = {json.dumps(of) if isinstance(of, str) else repr(of)}\n" for key, of in given.items()]
+        lines = [
+            f"{key} = {json.dumps(of) if isinstance(of, str) else repr(of)}\n" for key, of in given.items()
+        ]
         text += "".join([f"\n[{table}]\n", *lines]) if lines else ""
     return text

@@ -15,14 +15,20 @@ import numpy as np
 from tfarm.arrays import Real as Reals
 from tfarm.errors import ParameterError, require
 
-SMALLEST_NUMBER = 1e-40  # far outside any arm, yet no product of a few such numbers underflows
-LARGEST_NUMBER = 1e40  # nor overflows
-OUT_OF_RANGE = f"beyond any arm ({SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}); check the unit: m, kg, s, Pa throughout"
+# far outside any arm, yet no product of a few such numbers underflows
+SMALLEST_NUMBER = 1e-40
+# nor overflows
+LARGEST_NUMBER = 1e40
+OUT_OF_RANGE = (
+    f"beyond any arm ({SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}); check the unit: m, kg, s, Pa throughout"
+)
 Input = Literal["hub_torque", "motor_voltage", "motor_current", "hub_angle"]
 INPUTS: tuple[Input, ...] = get_args(Input)
 INPUT_UNITS = {"hub_torque": "N m", "motor_voltage": "V", "motor_current": "A", "hub_angle": "rad"}
-Check = Callable[[str, object, str], float | None]  # of key, value and the legal values in words
-Theory = Literal["timoshenko", "shear", "rayleigh", "euler-bernoulli"]  # of the beam
+# of key, value and the legal values in words
+Check = Callable[[str, object, str], float | None]
+# of the beam
+Theory = Literal["timoshenko", "shear", "rayleigh", "euler-bernoulli"]
 THEORIES: tuple[Theory, ...] = get_args(Theory)
 WITH_ROTARY_INERTIA: tuple[Theory, ...] = ("timoshenko", "rayleigh")
 WITH_SHEAR: tuple[Theory, ...] = ("timoshenko", "shear")
@@ -71,7 +77,8 @@ def signed(key: str, value: object, meaning: str) -> float:
     x = number(key, value, meaning)
     require(not math.isinf(x), key, x, meaning)
     require(x == 0.0 or SMALLEST_NUMBER <= abs(x) <= LARGEST_NUMBER, key, x, OUT_OF_RANGE)
-    return x + 0.0  # -0.0 becomes 0.0
+    # -0.0 becomes 0.0
+    return x + 0.0
 
 
 def extended(key: str, value: object, meaning: str) -> float:
@@ -95,7 +102,12 @@ def positive_if_given(key: str, value: object, meaning: str) -> float | None:
 def on_the_arm(key: str, x: Reals | float, length: float) -> Reals:
     """Return points x [m] of an arm of this length as an array.  Raises ParameterError for points off it and nan."""
     points = np.asarray(x, dtype=float)
-    require(np.all((points >= 0) & (points <= length)), key, x, f"a point of the arm lies between 0 and {length:g} m")
+    require(
+        np.all((points >= 0) & (points <= length)),
+        key,
+        x,
+        f"a point of the arm lies between 0 and {length:g} m",
+    )
     return points
 
 
@@ -119,7 +131,8 @@ def plain_name(name: Any) -> str:
     remedy = 'a name has 1 to 80 characters, begins with a letter or digit and has no / \\ : * ? " < > |'
     is_name = isinstance(name, str) and re.fullmatch(r'[^\W_]([^/\\:*?"<>|]{0,78}[^/\\:*?"<>| .])?', name)
     require(is_name and name.isprintable(), "name", name, remedy)
-    size = len(name.encode())  # file systems stop at 255 bytes, and a temporary file's name is longer than its own
+    # file systems stop at 255 bytes, and a temporary file's name is longer than its own
+    size = len(name.encode())
     require(size <= 200, "name", name, f"{size} bytes; at most 200")
     return str(name)
 

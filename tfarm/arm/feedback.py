@@ -29,22 +29,29 @@ class Gain:
     letter: str
 
 
+# in the order in which the outputs are fed back, everywhere
 GAINS = (
     Gain("Kp", "hub_angle", "N m/rad", "theta"),
     Gain("K1", "hub_rate", "N m s/rad", "theta_t"),
     Gain("K2", "root_moment", "1", "M"),
-)  # in the order in which the outputs are fed back, everywhere
-FED_BACK = AT_HUB = ("hub_angle", "hub_rate", "root_moment")  # theorems on the loop are about gains on these
-LISTED = tuple(sorted(GAINS, key=lambda gain: gain.name))  # in the order in which a person lists them
+)
+# theorems on the loop are about gains on these
+FED_BACK = AT_HUB = ("hub_angle", "hub_rate", "root_moment")
+# in the order in which a person lists them
+LISTED = tuple(sorted(GAINS, key=lambda gain: gain.name))
 NAMES = ("K1", "K2", "Kp")
-ON = {gain.output: gain.name for gain in GAINS}  # the name of the gain on each output
+# the name of the gain on each output
+ON = {gain.output: gain.name for gain in GAINS}
 OUTPUT_OF = {gain.name: gain.output for gain in GAINS}
 ANGLE_GAIN = "Kp"
 RATE_GAIN = "K1"
 MOMENT_GAIN = "K2"
-PLANE = (RATE_GAIN, MOMENT_GAIN)  # the gains of the paper's law: axes of the stability region
-TWO_GAINS = "K1-K2"  # the name of that structure, as PD or lead
-TAKEN_OFF = "Kp theta - K1 theta_t - K2 M"  # the law, subtracted from the input
+# the gains of the paper's law: axes of the stability region
+PLANE = (RATE_GAIN, MOMENT_GAIN)
+# the name of that structure, as PD or lead
+TWO_GAINS = "K1-K2"
+# the law, subtracted from the input
+TAKEN_OFF = "Kp theta - K1 theta_t - K2 M"
 SPELT_OUT = "Kp theta - K1 theta_t - K2 E I phi'(0)"
 
 

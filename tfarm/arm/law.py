@@ -25,9 +25,10 @@ from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean, must_be_known, require
 from tfarm.records import frozen
 
-MOST_SIGNALS = 12  # of a law, for time and memory
-REFERENCE = "reference:"  # before the name of a signal: its reference
-NUMBER = re.compile(r"(.*?)(?:\.gain|\.(num|den)\.(\d+))?", re.DOTALL)  # a signal, or one of its coefficients
+# before the name of a signal: its reference
+REFERENCE = "reference:"
+# a signal, or one of its coefficients
+NUMBER = re.compile(r"(.*?)(?:\.gain|\.(num|den)\.(\d+))?", re.DOTALL)
 
 
 @frozen
@@ -65,21 +66,31 @@ class Law:
     parts: tuple[Part, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
+        # of a law, for time and memory
+        most_signals = 12
         parts, periods = (self.parts, ()) if self.parts else _parts_of(self.entries)
         object.__setattr__(self, "parts", parts)
         object.__setattr__(self, "entries", {})
         check_annotated(self, "")
         known = {float(each) for each in periods}
         if self.period is not None:
-            known.add(positive("period", self.period, "a sampling period in s; leave it out for a continuous-time law"))
-        require(len(known) <= 1, "period", sorted(known), "the parts of a law have one sampling period in common")
+            known.add(
+                positive(
+                    "period", self.period, "a sampling period in s; leave it out for a continuous-time law"
+                )
+            )
+        require(
+            len(known) <= 1, "period", sorted(known), "the parts of a law have one sampling period in common"
+        )
         object.__setattr__(self, "period", known.pop() if known else None)
         object.__setattr__(self, "references", tuple(self.references))
         require(self.sign in (-1, 1), "sign", self.sign, "-1 (v = -C y, the default) or 1 (v = C y)")
         if self.input is not None:
             must_be_known("input", self.input, INPUTS)
         must_be_known("rule", self.rule, ("tustin", "zoh", "matched"))
-        require(len(self.signals) <= MOST_SIGNALS, "signals", len(self.signals), f"at most {MOST_SIGNALS} signals")
+        require(
+            len(self.signals) <= most_signals, "signals", len(self.signals), f"at most {most_signals} signals"
+        )
         for each in self.references:
             must_be_known("references", each, self.signals)
         remedy = "a discrete-time law is causal: give num at most the degree of den"
@@ -155,7 +166,9 @@ class Law:
         if not self.is_static or not set(self.signals) <= set(ON):
             return None
         numbers = self.values(np.zeros(1, complex))[:, 0].real
-        return HubFeedback(**{ON[name]: float(each) for name, each in zip(self.signals, numbers, strict=True)})
+        return HubFeedback(
+            **{ON[name]: float(each) for name, each in zip(self.signals, numbers, strict=True)}
+        )
 
     @property
     def numbers(self) -> dict[str, float]:
@@ -250,7 +263,9 @@ class Law:
 
         names = [name for part in self.parts for name in part.signals]
         chosen = np.array([[name == each for each in columns or self.signals] for name in names], float)
-        A, B, C, D = (block_diag(*each) for each in zip(*(part.block.matrices() for part in self.parts), strict=True))
+        A, B, C, D = (
+            block_diag(*each) for each in zip(*(part.block.matrices() for part in self.parts), strict=True)
+        )
         C, D = (-self.sign * each.sum(axis=0, keepdims=True) for each in (C, D))
         return A, B @ chosen, C, D @ chosen
 
@@ -263,7 +278,9 @@ class Law:
     def weighted(self, factors: Sequence[float]) -> Law:
         """Return the law with each part times its own factor."""
         pairs = zip(self.parts, factors, strict=True)
-        return replace(self, parts=tuple(Part(part.signals, part.block.times(factor)) for part, factor in pairs))
+        return replace(
+            self, parts=tuple(Part(part.signals, part.block.times(factor)) for part, factor in pairs)
+        )
 
     def having(self, key: str, value: float) -> Law:
         """Return the law with another value of one number.
@@ -290,7 +307,10 @@ class Law:
 def _parts_of(entries: Mapping[str, Any]) -> tuple[tuple[Part, ...], tuple[float, ...]]:
     """Return the blocks of the entries of a law, and their sampling periods [s]."""
     require(
-        isinstance(entries, Mapping) and entries, "law", entries, 'name at least one signal, such as {"hub_rate": 0.3}'
+        isinstance(entries, Mapping) and entries,
+        "law",
+        entries,
+        'name at least one signal, such as {"hub_rate": 0.3}',
     )
     blocks = {name: block_of(_signal(name), entry) for name, entry in entries.items()}
     for name, (block, _) in blocks.items():

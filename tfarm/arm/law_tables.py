@@ -78,12 +78,15 @@ def law_of_table(table: Any, folder: Path) -> Law:
     require(isinstance(table, dict), "law", table, "give a table, headed [law]")
     signals = {key: value for key, value in table.items() if isinstance(value, dict)}
     others = {key: value for key, value in table.items() if key not in signals}
-    for key, value in others.items():  # hub_angle = 2.0, and no misspelt delay
+    # hub_angle = 2.0, and no misspelt delay
+    for key, value in others.items():
         is_signal = type(value) in (int, float) and not close_to(key, LawTable.model_fields)
         remedy = f"a signal has a table of its own: [law.{key}] with gain = {value}"
         require(not is_signal, f"law.{key}", value, remedy)
     head = validate_table(LawTable, others, "law")
-    common = head.model_dump(include={"name", "input", "delay", "period", "sign", "references", "rule", "prewarp"})
+    common = head.model_dump(
+        include={"name", "input", "delay", "period", "sign", "references", "rule", "prewarp"}
+    )
     try:
         if head.matrices is not None:
             remedy = "either matrices and signals, or a table for each signal"
@@ -105,10 +108,13 @@ def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
     """Return the law of a .mat file with A, B, C and D, or of its structure named `system`."""
     signals = head.signals or []
     require(signals, "signals", MISSING, "name a signal for each column of B")
-    found, _ = read_mat(folder / str(head.matrices), 16 << 20, key="matrices")  # bytes at most
+    # bytes at most
+    found, _ = read_mat(folder / str(head.matrices), 16 << 20, key="matrices")
     place = ""
     if head.system is not None:
-        must_be_known("system", head.system, dict.fromkeys(name.split(".")[0] for name in found if "." in name))
+        must_be_known(
+            "system", head.system, dict.fromkeys(name.split(".")[0] for name in found if "." in name)
+        )
         place = f"{head.system}."
     missing = [name for name in "ABCD" if f"{place}{name}" not in found]
     remedy = f"holds no {', '.join(missing)}; it has {list_within(found, 300)} (system = names a structure)"
@@ -119,5 +125,6 @@ def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
         return law
     require(len(head.scales) == len(signals), "scales", head.scales, "one number for each signal")
     (part,) = law.parts
-    A, B, C, D = part.block.matrices()  # of finite numbers now
+    # of finite numbers now
+    A, B, C, D = part.block.matrices()
     return Law.of_matrices(A, B * head.scales, C, D * head.scales, signals, **common)

@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 from tfarm.digits import general
 from tfarm.errors import must_be_known, require
 
-SHEAR = ("shear_modulus", "poissons_ratio")  # keys of [link], of which there is one
+# keys of [link], of which there is one
+SHEAR = ("shear_modulus", "poissons_ratio")
 WORDS = {  # keys of [link] that a material fills: symbol, unit and size of the unit
     "density": ("ρ", "kg/m^3", 1.0),
     "youngs_modulus": ("E", "GPa", 1e9),
     "shear_modulus": ("G", "GPa", 1e9),
     "poissons_ratio": ("ν", "", 1.0),
 }
-NOT_ISOTROPIC = "is not isotropic: G is no function of E; give shear_modulus, in Pa"
 
 
 class Material(NamedTuple):
@@ -38,7 +38,8 @@ class Material(NamedTuple):
     def words(self, keys: Iterable[str]) -> str:
         """Return some of its numbers with their source."""
         numbers = (
-            f"{WORDS[key][0]} = {general(getattr(self, key) / WORDS[key][2], 6)} {WORDS[key][1]}" for key in keys
+            f"{WORDS[key][0]} = {general(getattr(self, key) / WORDS[key][2], 6)} {WORDS[key][1]}"
+            for key in keys
         )
         return f"material {self.name}: {', '.join(map(str.rstrip, numbers))} ({self.source})"
 
@@ -55,13 +56,14 @@ def of_material(table: Any) -> tuple[Material, dict[str, float]] | None:
 
     None without a material.  Raises ParameterError for an unknown one, and for Poisson's ratio of a laminate.
     """
+    not_isotropic = "is not isotropic: G is no function of E; give shear_modulus, in Pa"
     name = table.get("material") if isinstance(table, dict) else None
     if not isinstance(name, str):
         return None
     must_be_known("link.material", name, materials())
     found = materials()[name]
     is_right = found.is_isotropic or "poissons_ratio" not in table
-    require(is_right, "link.poissons_ratio", table.get("poissons_ratio"), f"{name} {NOT_ISOTROPIC}")
+    require(is_right, "link.poissons_ratio", table.get("poissons_ratio"), f"{name} {not_isotropic}")
     has_shear = any(key in table for key in SHEAR)
     lacking = [key for key in WORDS if key not in table and not (key in SHEAR and has_shear)]
     return found, {key: value for key in lacking if (value := getattr(found, key)) is not None}

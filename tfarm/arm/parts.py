@@ -82,7 +82,9 @@ class Section:
     def __post_init__(self) -> None:
         check_annotated(self, "link.section")
         if self.shear_factor is not None:
-            meaning = "a shear factor multiplies G A: above 0, up to 1 (a form factor of 6/5 is entered as 5/6)"
+            meaning = (
+                "a shear factor multiplies G A: above 0, up to 1 (a form factor of 6/5 is entered as 5/6)"
+            )
             kappa = positive("link.section.shear_factor", self.shear_factor, meaning)
             require(kappa <= 1.0, "link.section.shear_factor", kappa, meaning)
             object.__setattr__(self, "shear_factor", kappa)
@@ -105,7 +107,9 @@ class Section:
         return cls._named("round", shear_factor, diameter=diameter)
 
     @classmethod
-    def tube(cls, *, outer_diameter: float, inner_diameter: float, shear_factor: float | None = None) -> Section:
+    def tube(
+        cls, *, outer_diameter: float, inner_diameter: float, shear_factor: float | None = None
+    ) -> Section:
         """A round tube."""
         return cls._named("tube", shear_factor, outer_diameter=outer_diameter, inner_diameter=inner_diameter)
 
@@ -171,16 +175,22 @@ class Link:
     youngs_modulus: Annotated[float, positive, MODULUS]
     shear_modulus: Annotated[float, positive, "a shear modulus is a positive, finite number in Pa"]
     section: Section
-    damping: Annotated[float, not_negative, "damping C is zero or a positive time in seconds, as in E (1 + C s)"] = 0.0
+    damping: Annotated[
+        float, not_negative, "damping C is zero or a positive time in seconds, as in E (1 + C s)"
+    ] = 0.0
     stated_ratio: float | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        if self.stated_ratio is not None and self.shear_modulus != self.youngs_modulus / (2 * (1 + self.stated_ratio)):
-            object.__setattr__(self, "stated_ratio", None)  # of a link with another modulus
+        if self.stated_ratio is not None and self.shear_modulus != self.youngs_modulus / (
+            2 * (1 + self.stated_ratio)
+        ):
+            # of a link with another modulus
+            object.__setattr__(self, "stated_ratio", None)
         check_annotated(self, "link")
         remedy = f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units"
         require(self.slenderness <= 1e9, "link.length", self.length, remedy)
-        nu = self.poissons_ratio  # the argument of Cowper's factor; the margins allow for a rounded G
+        # the argument of Cowper's factor; the margins allow for a rounded G
+        nu = self.poissons_ratio
         remedy = (
             f"with this Young's modulus it means a Poisson's ratio of {nu:.4g}, outside (-1, 0.5]; "
             "correct it, or give link.section.shear_factor for a material that is not isotropic"
@@ -277,8 +287,12 @@ class Hub:
     `radius` r [m] is the distance from the axis to the clamp; `stiffness` [N m/rad] is a spring to ground.
     """
 
-    inertia: Annotated[float, extended, "a hub inertia is zero (free pin), positive in kg m^2, or inf (locked)"]
-    friction: Annotated[float, not_negative, "a hub friction is zero or a positive, finite number in N m s/rad"] = 0.0
+    inertia: Annotated[
+        float, extended, "a hub inertia is zero (free pin), positive in kg m^2, or inf (locked)"
+    ]
+    friction: Annotated[
+        float, not_negative, "a hub friction is zero or a positive, finite number in N m s/rad"
+    ] = 0.0
     radius: Annotated[
         float,
         not_negative,
@@ -293,7 +307,9 @@ class Hub:
     def __post_init__(self) -> None:
         check_annotated(self, "hub")
         for name, value in (("friction", self.friction), ("stiffness", self.stiffness)):
-            remedy = f"no effect, as inertia = inf locks the hub; leave out the {name}, or give a finite inertia"
+            remedy = (
+                f"no effect, as inertia = inf locks the hub; leave out the {name}, or give a finite inertia"
+            )
             require(math.isfinite(self.inertia) or not value, f"hub.{name}", value, remedy)
 
     def __repr__(self) -> str:
@@ -307,7 +323,9 @@ class RotarySpring:
     stiffness: Annotated[
         float, above_zero, "the stiffness of a clamp or joint is positive in N m/rad, or inf (rigid)"
     ] = math.inf
-    damping: Annotated[float, not_negative, "damping c is zero or a positive time in seconds, as in k (1 + c s)"] = 0.0
+    damping: Annotated[
+        float, not_negative, "damping c is zero or a positive time in seconds, as in k (1 + c s)"
+    ] = 0.0
 
     def __post_init__(self) -> None:
         check_annotated(self, "spring")
@@ -331,16 +349,23 @@ class Motor:
 
     resistance: Annotated[float, positive, "a motor's resistance is a positive, finite number of ohms"]
     torque_constant: Annotated[float, positive, "a torque constant is a positive, finite number in N m/A"]
+    # Kt then
     back_emf_constant: Annotated[
         float, not_negative, "a back-EMF constant is zero or a positive, finite number in V s/rad"
-    ] = cast("float", None)  # Kt then
-    inductance: Annotated[float, not_negative, "an inductance is zero or a positive, finite number of henries"] = 0.0
-    gear_ratio: Annotated[float, positive, "a gear ratio, motor turns per hub turn, is a positive, finite number"] = 1.0
+    ] = cast("float", None)
+    inductance: Annotated[
+        float, not_negative, "an inductance is zero or a positive, finite number of henries"
+    ] = 0.0
+    gear_ratio: Annotated[
+        float, positive, "a gear ratio, motor turns per hub turn, is a positive, finite number"
+    ] = 1.0
     rotor_inertia: Annotated[
         float, not_negative, "a rotor inertia is zero or a positive, finite number in kg m^2, before the gear"
     ] = 0.0
     rotor_friction: Annotated[
-        float, not_negative, "a rotor friction is zero or a positive, finite number in N m s/rad, before the gear"
+        float,
+        not_negative,
+        "a rotor friction is zero or a positive, finite number in N m s/rad, before the gear",
     ] = 0.0
     gear_efficiency: Annotated[float, positive, "an efficiency is above 0"] = 1.0
 
@@ -370,8 +395,12 @@ class Attachment:
         "an attachment's place is zero or a positive number of metres from the clamp, up to the tip",
     ]
     mass: Annotated[float, not_negative, "an attached mass is zero or a positive, finite number in kg"] = 0.0
-    inertia: Annotated[float, not_negative, "an attached inertia is zero or a positive, finite number in kg m^2"] = 0.0
-    stiffness: Annotated[float, not_negative, "an attached spring to ground is zero or positive, finite, in N/m"] = 0.0
+    inertia: Annotated[
+        float, not_negative, "an attached inertia is zero or a positive, finite number in kg m^2"
+    ] = 0.0
+    stiffness: Annotated[
+        float, not_negative, "an attached spring to ground is zero or positive, finite, in N/m"
+    ] = 0.0
     rotational_stiffness: Annotated[
         float, not_negative, "an attached rotary spring to ground is zero or positive, finite, in N m/rad"
     ] = 0.0
@@ -394,7 +423,9 @@ class Gauge:
     At a joint of two segments, or at an attachment, it is on the outer side unless `side` is "inner".
     """
 
-    x: Annotated[float, not_negative, "a gauge's place is zero or a positive number of metres from the clamp"] = 0.0
+    x: Annotated[
+        float, not_negative, "a gauge's place is zero or a positive number of metres from the clamp"
+    ] = 0.0
     side: Literal["outer", "inner"] = "outer"
 
     def __post_init__(self) -> None:
@@ -410,9 +441,9 @@ class Payload:
     """
 
     mass: Annotated[float, extended, "a payload mass is zero, positive in kg, or inf (tip pinned)"] = 0.0
-    inertia: Annotated[float, extended, "a payload inertia is zero, positive in kg m^2, or inf (tip cannot rotate)"] = (
-        0.0
-    )
+    inertia: Annotated[
+        float, extended, "a payload inertia is zero, positive in kg m^2, or inf (tip cannot rotate)"
+    ] = 0.0
     offset: Annotated[
         float, signed, "a payload's offset is a finite number of metres beyond the tip, negative before it"
     ] = 0.0

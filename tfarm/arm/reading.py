@@ -15,7 +15,8 @@ from tfarm.errors import ParameterError, did_you_mean, name_file, require, short
 from tfarm.files import read_file
 
 PRESETS = files("tfarm.arm") / "presets"
-MOST_ARM_BYTES = 64 * 1024  # of an arm's file; that of 64 segments has 15 KB
+# of an arm's file; that of 64 segments has 15 KB
+MOST_ARM_BYTES = 64 * 1024
 
 
 @cache
@@ -31,12 +32,14 @@ class ArmFile(NamedTuple):
     name: str
 
 
-AnyFile = str | os.PathLike[str] | ArmFile  # a preset's name, a path, or what was read of either
+# a preset's name, a path, or what was read of either
+AnyFile = str | os.PathLike[str] | ArmFile
 
 
 def load(name_or_path: AnyFile) -> Arm:
     """Return the arm of a preset's name or of a TOML file's path.  Raises ParameterError, naming the file."""
-    from tfarm.arm.schema import arm_of_table  # here, as the import of pydantic is slow
+    # here, as the import of pydantic is slow
+    from tfarm.arm.schema import arm_of_table
 
     tables, name = load_tables(name_or_path)
     with name_file(name):
@@ -54,7 +57,9 @@ def load_tables(name_or_path: AnyFile) -> ArmFile:
     if is_named and name in presets():
         data = PRESETS.joinpath(f"{name}.toml").read_bytes()
         name = f"{name}.toml"
-    elif is_named and not ({"/", "\\", os.sep} & set(name) or name.endswith(".toml") or os.path.lexists(name)):
+    elif is_named and not (
+        {"/", "\\", os.sep} & set(name) or name.endswith(".toml") or os.path.lexists(name)
+    ):
         remedy = f"no such preset: {did_you_mean(name, presets())}; or give the path of a .toml file"
         raise ParameterError(key="arm", value=name, remedy=remedy)
     else:
@@ -109,10 +114,9 @@ USUAL = {  # of a segment: least and largest value, each with the warning beyond
         25_000.0,  # osmium has 22,600
         "denser than osmium; its unit is kg/m^3",
     ),
-    "length": (0.0, "", 100.0, "longer than any arm; its unit is m, not in mm"),  # that of the space station has 17
+    # that of the space station has 17
+    "length": (0.0, "", 100.0, "longer than any arm; its unit is m, not in mm"),
 }
-HEAVIEST = 1e5  # times the link's own mass or inertia
-FARTHEST_OFFSET = 10.0  # times the link's length; a hub's radius and a payload's offset are a fraction of it
 
 
 def implausible(arm: Arm) -> tuple[str, ...]:
@@ -121,7 +125,9 @@ def implausible(arm: Arm) -> tuple[str, ...]:
     Empty for a plausible arm.
     """
     keys = [f"link.{i}" for i in range(1, len(arm.links) + 1)] if arm.outer else ["link"]
-    segments = [text for key, link in zip(keys, arm.links, strict=True) for text in _segment(key, link, arm.length)]
+    segments = [
+        text for key, link in zip(keys, arm.links, strict=True) for text in _segment(key, link, arm.length)
+    ]
     return (*segments, *_parts(arm))
 
 
@@ -152,18 +158,24 @@ def _segment(key: str, link: Link, length: float) -> Iterator[str]:
 
 def _parts(arm: Arm) -> Iterator[str]:
     """Yield the warnings of hub, payload, clamp, motor and attachments: values by a ratio to those of the link."""
+    # times the link's own mass or inertia
+    heaviest = 1e5
+    # times the link's length; a hub's radius and a payload's offset are a fraction of it
+    farthest_offset = 10.0
     hub = arm.hub
     payload = arm.payload
     length = arm.length
     mass = arm.own_mass
-    beam = mass * length**2 / 3  # kg m^2, spread evenly from the axis
-    bending = 3 * arm.bending_scale  # N m
+    # kg m^2, spread evenly from the axis
+    beam = mass * length**2 / 3
+    # N m
+    bending = 3 * arm.bending_scale
     radius = math.sqrt(payload.inertia / payload.mass) if 0.0 < payload.mass < math.inf else 0.0
     heavy = "{:.1g} times the link's; in kg?"
     far = "{:.3g} times the link's length; its unit is m, not mm"
     limits = [  # key, value, its ratio, the largest ratio, and the warning
-        ("hub.inertia", hub.inertia, hub.inertia / beam, HEAVIEST, "{:.1g} times the link's; in kg m^2?"),
-        ("payload.mass", payload.mass, payload.mass / mass, HEAVIEST, heavy),
+        ("hub.inertia", hub.inertia, hub.inertia / beam, heaviest, "{:.1g} times the link's; in kg m^2?"),
+        ("payload.mass", payload.mass, payload.mass / mass, heaviest, heavy),
         (
             "payload.inertia",
             payload.inertia,
@@ -171,8 +183,8 @@ def _parts(arm: Arm) -> Iterator[str]:
             1.0,
             f"a radius of gyration of {radius:.3g} m, above the link's length; in kg m^2?",
         ),
-        ("hub.radius", hub.radius, hub.radius / length, FARTHEST_OFFSET, far),
-        ("payload.offset", abs(payload.offset), abs(payload.offset) / length, FARTHEST_OFFSET, far),
+        ("hub.radius", hub.radius, hub.radius / length, farthest_offset, far),
+        ("payload.offset", abs(payload.offset), abs(payload.offset) / length, farthest_offset, far),
         (
             "clamp.stiffness",
             arm.clamp.stiffness,
@@ -192,9 +204,9 @@ def _parts(arm: Arm) -> Iterator[str]:
         rotor = "through the gear {:.1g} times the link's; its unit is kg m^2, before the gear"
         own = arm.motor.rotor_inertia
         reflected = arm.motor.reflected_inertia
-        limits.append(("motor.rotor_inertia", own, reflected / beam, HEAVIEST, rotor))
+        limits.append(("motor.rotor_inertia", own, reflected / beam, heaviest, rotor))
     for i, each in enumerate(arm.attachments, 1):
-        limits.append((f"attachment.{i}.mass", each.mass, each.mass / mass, HEAVIEST, heavy))
+        limits.append((f"attachment.{i}.mass", each.mass, each.mass / mass, heaviest, heavy))
     for key, value, ratio, most, text in limits:
         if most < ratio < math.inf:
             yield f"{key} = {short_text(value)}: {text.format(ratio)}"

@@ -22,8 +22,10 @@ from tfarm.arm.checks import (
 from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, brief_repr
 from tfarm.errors import ParameterError, must_be_known, require, short_text
 
-MOST_PARTS = 64  # segments, and attachments: a check of the chain has 64 equal pieces
-IDEAL_MOTOR = Motor(resistance=1.0, torque_constant=1.0, back_emf_constant=0.0)  # without inertia, friction and gear
+# segments, and attachments: a check of the chain has 64 equal pieces
+MOST_PARTS = 64
+# without inertia, friction and gear
+IDEAL_MOTOR = Motor(resistance=1.0, torque_constant=1.0, back_emf_constant=0.0)
 
 _PartRecord = TypeVar("_PartRecord")
 
@@ -57,10 +59,13 @@ class Arm:
         object.__setattr__(self, "name", plain_name(self.name))
         object.__setattr__(self, "assumptions", plain_texts(self.assumptions))
         object.__setattr__(self, "outer", _parts("outer", self.outer, Link, MOST_PARTS - 1))
-        object.__setattr__(self, "attachments", _parts("attachments", self.attachments, Attachment, MOST_PARTS))
+        object.__setattr__(
+            self, "attachments", _parts("attachments", self.attachments, Attachment, MOST_PARTS)
+        )
         must_be_known("theory", self.theory, THEORIES)
         must_be_known("input", self.input, INPUTS)
-        slenderness = min(self.length / link.section.radius_of_gyration for link in self.links)  # of the whole length
+        # of the whole length
+        slenderness = min(self.length / link.section.radius_of_gyration for link in self.links)
         remedy = f"{slenderness:.3g} times the section's radius of gyration is no beam; check the units"
         require(slenderness >= 1e-3, "length" if self.outer else "link.length", self.length, remedy)
         self._check_places()
@@ -76,7 +81,8 @@ class Arm:
 
     def _check_places(self) -> None:
         """Check the places of attachments, gauge and pin; move an attachment that rounding has put beyond the tip."""
-        end = self.length * (1 + 1e-12)  # with the rounding of a sum of up to 64 decimal lengths
+        # with the rounding of a sum of up to 64 decimal lengths
+        end = self.length * (1 + 1e-12)
         places = [(f"attachment.{i}", each.x, end) for i, each in enumerate(self.attachments, 1)]
         remedy = f"is beyond the tip; x counts from the clamp, up to the link's length of {self.length!r} m"
         for part, x, most in [*places, ("gauge", self.gauge.x, self.length)]:
@@ -84,7 +90,9 @@ class Arm:
         on_it = tuple(replace(each, x=min(each.x, self.length)) for each in self.attachments)
         object.__setattr__(self, "attachments", on_it)
         is_right = math.isfinite(self.payload.mass) or abs(self.centre_distance) >= 1e-9 * self.reach
-        remedy = "puts the pinned centre of mass on the axis, which is fixed anyway; give a finite payload.mass"
+        remedy = (
+            "puts the pinned centre of mass on the axis, which is fixed anyway; give a finite payload.mass"
+        )
         require(is_right, "payload.offset", self.payload.offset, remedy)
 
     @property
@@ -163,7 +171,8 @@ class Arm:
     @property
     def has_massless_hub(self) -> bool:
         """Whether the hub has no inertia, friction or stiffness, and r = 0: then the root moment is -u."""
-        elsewhere = self.hub.radius, self.gauge.x  # the gauge measures another moment
+        # the gauge measures another moment
+        elsewhere = self.hub.radius, self.gauge.x
         return not any((self.hub_side_inertia, self.hub.stiffness, self.rate_loss, *elsewhere))
 
     @property
@@ -195,7 +204,8 @@ class Arm:
         """Yield the key and the stiffness of each spring to ground."""
         yield "hub.stiffness", self.hub.stiffness
         for i, each in enumerate(self.attachments, 1):
-            on_axis = not (each.x or self.hub.radius)  # where nothing moves
+            # where nothing moves
+            on_axis = not (each.x or self.hub.radius)
             yield f"attachment.{i}.stiffness", 0.0 if on_axis else each.stiffness
             yield f"attachment.{i}.rotational_stiffness", each.rotational_stiffness
 
@@ -240,9 +250,16 @@ class Arm:
             L = start - place if a == 0 else link.length
             if L > 0:
                 rotary = link.rhoI * L if self.theory in WITH_ROTARY_INERTIA else 0.0
-                beam += [link.rhoA * L**3 / 3, rotary, link.rhoA * L * a * (a + L), link.rhoA * c * L * (a + L / 2)]
+                beam += [
+                    link.rhoA * L**3 / 3,
+                    rotary,
+                    link.rhoA * L * a * (a + L),
+                    link.rhoA * c * L * (a + L / 2),
+                ]
         payload = self.payload.mass * (self.centre_distance * (self.centre_distance - c))
-        attached = [each.mass * ((self.hub.radius + each.x) * (each.x - place)) + each.inertia for each in bodies]
+        attached = [
+            each.mass * ((self.hub.radius + each.x) * (each.x - place)) + each.inertia for each in bodies
+        ]
         return own + math.fsum(beam) + payload + self.payload.inertia + math.fsum(attached)
 
     @property
@@ -258,7 +275,9 @@ class Arm:
     @property
     def reads_hub_moment(self) -> bool:
         """Whether the gauge measures the moment on the hub: it is at the root, r = 0, no inertia at the clamp."""
-        at_clamp = any(each.x == 0 and (each.inertia or each.rotational_stiffness) for each in self.attachments)
+        at_clamp = any(
+            each.x == 0 and (each.inertia or each.rotational_stiffness) for each in self.attachments
+        )
         return not (self.hub.radius or self.gauge.x or at_clamp)
 
     @property
@@ -386,9 +405,15 @@ def must_have_free_hub(arm: Arm) -> None:
 def must_turn(arm: Arm) -> None:
     """Raise ParameterError, naming the infinite part or the spring, for an arm that cannot slew."""
     payload = arm.payload
-    parts = ("hub.inertia", arm.hub.inertia), ("payload.mass", payload.mass), ("payload.inertia", payload.inertia)
+    parts = (
+        ("hub.inertia", arm.hub.inertia),
+        ("payload.mass", payload.mass),
+        ("payload.inertia", payload.inertia),
+    )
     for key, value in parts:
-        require(not math.isinf(value), key, value, "an arm that cannot turn has no slew; give finite inertias")
+        require(
+            not math.isinf(value), key, value, "an arm that cannot turn has no slew; give finite inertias"
+        )
     for key, value in arm._springs_to_ground():
         require(value <= 0.0, key, value, "an arm with a spring to ground has no slew; leave the spring out")
 

@@ -24,15 +24,16 @@ from tfarm.schema import Quantity
 
 _Strict = TypeVar("_Strict", bound="StrictTable")
 _AnyTable = TypeVar("_AnyTable", bound="TomlTable")
-LOOP_TABLES = ("sampling", "converters", "actuator", "slew", "law")  # of the loop: read by other rooms
-OF_INPUT = "N m, V or A"  # unit of a limit of the input
+# unit of a limit of the input
+OF_INPUT = "N m, V or A"
 EXPECTED: dict[Any, str] = {
     float: "a number without quotes, in SI units",
     str: "a text in double quotes",
     list[str]: "a list of texts in double quotes",
     dict[str, Any]: "a table, headed [link.section]",
 }
-AT_THE_TOP = ("name", "assumptions", "theory", "input")  # keys before the first table
+# keys before the first table
+AT_THE_TOP = ("name", "assumptions", "theory", "input")
 
 
 class StrictTable(BaseModel):
@@ -49,7 +50,8 @@ class TomlTable(StrictTable):
 
     def build(self) -> Any:
         """Return the record of the table.  Raises ParameterError for illegal numbers."""
-        given = self.model_fields_set - {"shape"}  # which has chosen the constructor of a section
+        # which has chosen the constructor of a section
+        given = self.model_fields_set - {"shape"}
         return type(self).makes(**{name: getattr(self, name) for name in given})
 
 
@@ -62,14 +64,18 @@ def validate_table(model: type[_Strict], table: Any, place: str) -> _Strict:
     try:
         return model.model_validate(table)
     except ValidationError as error:
-        problem = min(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
+        problem = min(
+            error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden"
+        )
     key = ".".join(filter(None, (place, *map(str, problem["loc"]))))
     word = str(problem["loc"][0])
     value = problem["input"]
     known = model.model_fields
     if word not in known:
         is_of_top = place and word in AT_THE_TOP
-        remedy = f"unknown key; {word} belongs at the top of the file" if is_of_top else unknown_key(word, known)
+        remedy = (
+            f"unknown key; {word} belongs at the top of the file" if is_of_top else unknown_key(word, known)
+        )
         raise ParameterError(key=key, value=value, remedy=remedy)
     expected = f"a table, headed [{word}]" if word in ARM_TABLES else EXPECTED.get(known[word].annotation)
     remedy = f"give {expected}" if expected else problem["msg"]
@@ -78,7 +84,9 @@ def validate_table(model: type[_Strict], table: Any, place: str) -> _Strict:
     raise ParameterError(key=key, value=value, remedy=f"wrong type; {remedy}")
 
 
-def validated_file(model: type[_Strict], path: str | os.PathLike[str], most: int, *, key: str, what: str) -> _Strict:
+def validated_file(
+    model: type[_Strict], path: str | os.PathLike[str], most: int, *, key: str, what: str
+) -> _Strict:
     """Return the table of a JSON file of at most `most` bytes; `what` names the kind of file ("a tuner's file").
 
     Raises ParameterError, naming the file, for its first problem; one that cannot be read is named under `key`.
@@ -90,7 +98,9 @@ def validated_file(model: type[_Strict], path: str | os.PathLike[str], most: int
         problem = error.errors(include_url=False)[0]
     place = ".".join(map(str, problem["loc"])) or "file"
     value = {"json_invalid": os.fspath(path), "missing": MISSING}.get(problem["type"], problem["input"])
-    raise ParameterError(key=place, value=value, remedy=f"{problem['msg']}; give {what}", file=os.fspath(path))
+    raise ParameterError(
+        key=place, value=value, remedy=f"{problem['msg']}; give {what}", file=os.fspath(path)
+    )
 
 
 def of(makes: Callable[..., Any]) -> Callable[[type[_AnyTable]], type[_AnyTable]]:
@@ -103,7 +113,8 @@ def of(makes: Callable[..., Any]) -> Callable[[type[_AnyTable]], type[_AnyTable]
         hints = get_type_hints(makes)
         own: dict[str, Any] = {}
         for name, each in signature(makes).parameters.items():
-            if name not in table.model_fields and name != "stated_ratio":  # which is poissons_ratio in a file
+            # which is poissons_ratio in a file
+            if name not in table.model_fields and name != "stated_ratio":
                 own[name] = hints[name], ... if each.default is Parameter.empty else each.default
         made: type[_AnyTable] = create_model(table.__name__, __base__=table, __doc__=table.__doc__, **own)
         made.makes = makes
@@ -136,7 +147,8 @@ class LinkTable(TomlTable):
         require(shape in SHAPE_TABLES, "link.section.shape", shape, f"give one of {', '.join(SHAPE_TABLES)}")
         section = validate_table(SHAPE_TABLES[shape], self.section, "link.section").build()
         is_isotropic = self.material is None or materials()[self.material].is_isotropic
-        if not is_isotropic and section.shear_factor is None:  # Cowper's needs a Poisson's ratio of at most 0.5
+        # Cowper's needs a Poisson's ratio of at most 0.5
+        if not is_isotropic and section.shear_factor is None:
             section = replace(section, shear_factor=section.cowper_factor(0.0))
         remedy = "give it in Pa, or give poissons_ratio"
         require(self.shear_modulus is not None or nu is not None, "link.shear_modulus", MISSING, remedy)
@@ -166,7 +178,14 @@ class ArmTable(StrictTable):
 SHAPE_TABLES: dict[str, type[TomlTable]] = {
     shape: of(getattr(Section, shape))(SectionTable) for shape in ("rectangle", "round", "tube", "general")
 }
-PARTS = {"hub": Hub, "clamp": RotarySpring, "joint": RotarySpring, "motor": Motor, "gauge": Gauge, "payload": Payload}
+PARTS = {
+    "hub": Hub,
+    "clamp": RotarySpring,
+    "joint": RotarySpring,
+    "motor": Motor,
+    "gauge": Gauge,
+    "payload": Payload,
+}
 PART_TABLES: dict[str, type[TomlTable]] = {
     "link": LinkTable,
     "attachment": of(Attachment)(TomlTable),
@@ -177,7 +196,11 @@ ARM_TABLES: dict[str, type[StrictTable]] = {"": ArmTable, **PART_TABLES}
 
 def arm_of_table(table: dict[str, Any]) -> Arm:
     """Return the arm of a parsed TOML table.  Raises ParameterError for the first problem."""
-    head = validate_table(ArmTable, {key: value for key, value in table.items() if key not in LOOP_TABLES}, "")
+    # of the loop: read by other rooms
+    loop_tables = ("sampling", "converters", "actuator", "slew", "law")
+    head = validate_table(
+        ArmTable, {key: value for key, value in table.items() if key not in loop_tables}, ""
+    )
     own = head.model_dump(exclude_unset=True)
     parts = parts_of_tables(own)
     own["assumptions"] = [*head.assumptions, *material_assumptions(_listed(head.link))]
@@ -218,7 +241,9 @@ def _built(name: str, tables: Any, wanted: str) -> list[Any]:
 def file_keys() -> dict[str, Quantity]:
     """Return label, unit and meaning of every key of a file: "top.name", "link.section.width", "law.SIGNAL.gain"."""
     tables = tomllib.loads((files("tfarm.arm") / "keys.toml").read_text("utf-8"))
-    return {f"{place}.{key}": Quantity(**words) for place, keys in tables.items() for key, words in keys.items()}
+    return {
+        f"{place}.{key}": Quantity(**words) for place, keys in tables.items() for key, words in keys.items()
+    }
 
 
 def file_key(key: str, arm: Arm | None = None) -> Quantity:
@@ -235,7 +260,9 @@ def file_key(key: str, arm: Arm | None = None) -> Quantity:
 def _within(name: str, place: str, table: Any) -> Any:
     """Return the record of a table; the key of a ParameterError begins with its place in the file."""
     try:
-        return validate_table(PART_TABLES[name], fill_material(table) if name == "link" else table, name).build()
+        return validate_table(
+            PART_TABLES[name], fill_material(table) if name == "link" else table, name
+        ).build()
     except ParameterError as error:
         key = ".".join((place, *error.key.split(".")[1:]))
         raise ParameterError(key=key, value=error.value, remedy=error.remedy) from None

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 from tfarm.errors import ParameterError
 
-ACTS = "acts"
 NAMED = "named"
 PARTLY = "partly"
 NONE = "none"
@@ -33,18 +32,52 @@ class Stage(NamedTuple):
 
 
 ARM_KEYS = (
-    "name", "assumptions", "theory", "input",
-    "link.length", "link.density", "link.youngs_modulus", "link.shear_modulus", "link.poissons_ratio", "link.damping",
-    "link.section.shape", "link.section.width", "link.section.depth", "link.section.diameter",
-    "link.section.outer_diameter", "link.section.inner_diameter", "link.section.area", "link.section.second_moment",
+    "name",
+    "assumptions",
+    "theory",
+    "input",
+    "link.length",
+    "link.density",
+    "link.youngs_modulus",
+    "link.shear_modulus",
+    "link.poissons_ratio",
+    "link.damping",
+    "link.section.shape",
+    "link.section.width",
+    "link.section.depth",
+    "link.section.diameter",
+    "link.section.outer_diameter",
+    "link.section.inner_diameter",
+    "link.section.area",
+    "link.section.second_moment",
     "link.section.shear_factor",
-    "hub.inertia", "hub.friction", "hub.radius", "hub.stiffness",
-    "clamp.stiffness", "clamp.damping", "joint.stiffness", "joint.damping",
-    "motor.resistance", "motor.inductance", "motor.torque_constant", "motor.back_emf_constant", "motor.gear_ratio",
-    "motor.rotor_inertia", "motor.rotor_friction", "motor.gear_efficiency",
-    "attachment.x", "attachment.mass", "attachment.inertia", "attachment.stiffness", "attachment.rotational_stiffness",
-    "gauge.x", "gauge.side", "payload.mass", "payload.inertia", "payload.offset",
-)  # fmt: skip
+    "hub.inertia",
+    "hub.friction",
+    "hub.radius",
+    "hub.stiffness",
+    "clamp.stiffness",
+    "clamp.damping",
+    "joint.stiffness",
+    "joint.damping",
+    "motor.resistance",
+    "motor.inductance",
+    "motor.torque_constant",
+    "motor.back_emf_constant",
+    "motor.gear_ratio",
+    "motor.rotor_inertia",
+    "motor.rotor_friction",
+    "motor.gear_efficiency",
+    "attachment.x",
+    "attachment.mass",
+    "attachment.inertia",
+    "attachment.stiffness",
+    "attachment.rotational_stiffness",
+    "gauge.x",
+    "gauge.side",
+    "payload.mass",
+    "payload.inertia",
+    "payload.offset",
+)
 
 STAGES = (
     Stage(
@@ -86,7 +119,9 @@ STAGES = (
         "range of the strain amplifier",
         is_linear=False,
     ),
-    Stage("law", (), "u_k = r_k + C x_k + D e_k, x_{k+1} = A x_k + B e_k, e = reference - signal", "controller"),
+    Stage(
+        "law", (), "u_k = r_k + C x_k + D e_k, x_{k+1} = A x_k + B e_k, e = reference - signal", "controller"
+    ),
     Stage(
         "arithmetic",
         ("converters.arithmetic",),
@@ -118,7 +153,12 @@ STAGES = (
     Stage("hold", ("sampling.period",), "u(t) = u_k from t_k + tau to t_{k+1} + tau", "zero-order hold"),
     Stage("delay", ("sampling.delay_samples",), "tau = delay_samples T", "computational delay"),
     Stage("hub damping", ("actuator.hub_damping",), "torque -b theta_t", "analog damping by the actuator"),
-    Stage("plant", ARM_KEYS, "a' = p a + u, y = Re(sum of r a) + ..., for each pole p of the arm", "the arm itself"),
+    Stage(
+        "plant",
+        ARM_KEYS,
+        "a' = p a + u, y = Re(sum of r a) + ..., for each pole p of the arm",
+        "the arm itself",
+    ),
     Stage("volts", ("actuator.motor_constant",), "V = u_k/constant", "voltage of the motor, in the record"),
 )
 STAGE_OF = {key: stage for stage in STAGES for key in stage.keys}
@@ -139,7 +179,8 @@ class Consumer(NamedTuple):
 
     def word(self, stage: str) -> str | None:
         """What it does with a stage; None for one that it refuses."""
-        return next((word for word in (ACTS, NAMED, PARTLY, NONE) if stage in getattr(self, word)), None)
+        acts = "acts"
+        return next((word for word in (acts, NAMED, PARTLY, NONE) if stage in getattr(self, word)), None)
 
     def refuse_others(self, *tables: Mapping[str, Any]) -> None:
         """Raise ParameterError for a key of tables of a file whose stage it does not state, or that no stage has."""
@@ -148,7 +189,9 @@ class Consumer(NamedTuple):
             stage = STAGE_OF.get(key)
             if stage is None or stage.name not in stated:
                 what = f"the stage {stage.name}" if stage else "this key"
-                raise ParameterError(key=key, value=value, remedy=f"{self.name} does not have {what}: leave it out")
+                raise ParameterError(
+                    key=key, value=value, remedy=f"{self.name} does not have {what}: leave it out"
+                )
 
     def not_covered(self, *tables: Mapping[str, Any]) -> str:
         """Return the end of its line of certainty: the keys of these tables that it is without."""

@@ -39,7 +39,8 @@ def arm_table(arm: Arm) -> dict[str, Any]:
         "name": arm.name,
         "assumptions": list(arm.assumptions),
         "theory": None if arm.theory == "timoshenko" else arm.theory,
-        "input": None if arm.input == "hub_torque" and motor is None else arm.input,  # required with a motor
+        # required with a motor
+        "input": None if arm.input == "hub_torque" and motor is None else arm.input,
         "link": links if arm.outer else links[0],
         "hub": repr_fields(arm.hub, always=1),
         "clamp": repr_fields(arm.clamp, always=0) or None,
@@ -49,7 +50,8 @@ def arm_table(arm: Arm) -> dict[str, Any]:
         "gauge": {"x": arm.gauge.x, "side": arm.gauge.side} if arm.gauge.x else None,
         "payload": repr_fields(arm.payload, always=2),
     }
-    if motor is not None and motor.back_emf_constant == motor.torque_constant:  # its default
+    # its default
+    if motor is not None and motor.back_emf_constant == motor.torque_constant:
         del tables["motor"]["back_emf_constant"]
     return {key: value for key, value in tables.items() if value is not None}
 
@@ -93,7 +95,9 @@ def _signal_table(part: Part) -> dict[str, Any]:
     """Return the table of one signal."""
     block = part.block
     if not isinstance(block, Rational) or len(part.signals) > 1:
-        remedy = "save a state space as a .mat file: scipy.io.savemat(file, {'A': ..}), matrices = file in [law]"
+        remedy = (
+            "save a state space as a .mat file: scipy.io.savemat(file, {'A': ..}), matrices = file in [law]"
+        )
         raise ParameterError(key="law", value=part.signals[0], remedy=remedy)
     is_gain = block.is_constant and block.den == (1.0,)
     return {"gain": block.num[0]} if is_gain else {"num": block.num, "den": block.den}
@@ -132,7 +136,9 @@ class KeyedArms:
     link has a stated shear modulus.  Raises ParameterError, naming `what`, for an unknown key, with the nearest.
     """
 
-    def __init__(self, arm: Arm, keys: Sequence[str], what: str = "free", alone: Collection[str] = ()) -> None:
+    def __init__(
+        self, arm: Arm, keys: Sequence[str], what: str = "free", alone: Collection[str] = ()
+    ) -> None:
         self.arm = arm
         self.keys = tuple(keys)
         self.alone = alone
@@ -160,7 +166,9 @@ class KeyedArms:
         """Return whether the shear modulus of a link changes with its Young's modulus, which has that key."""
         place = key.removesuffix("youngs_modulus")
         is_given = {f"{place}{name}" for name in SHEAR} & {*self.keys}
-        return not is_given and (key not in self.alone or "shear_modulus" not in _table_of(self._table, key)[0])
+        return not is_given and (
+            key not in self.alone or "shear_modulus" not in _table_of(self._table, key)[0]
+        )
 
     def value(self, key: str) -> float:
         """Return a number of the arm, from its file or its default."""
@@ -179,7 +187,9 @@ def numbers_of(arm: Arm) -> dict[str, float]:
     parts |= {f"attachment.{n}": each for n, each in enumerate(arm.attachments, 1)}
     for place, part in parts.items():
         if part is not None:
-            found |= {f"{place}.{name}": value for name, value in repr_fields(part, always=MOST_PARTS).items()}
+            found |= {
+                f"{place}.{name}": value for name, value in repr_fields(part, always=MOST_PARTS).items()
+            }
     return found
 
 
@@ -195,28 +205,28 @@ def _table_of(table: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:
 # ------------------------------------------------------------ a first file
 
 
-HEAD = "# An arm of tfarm, in SI units throughout.\n"
-REPLACED = "density, youngs_modulus, shear_modulus or poissons_ratio in [link] replace the numbers of the material"
-UNDAMPED = "# damping = 0.0003"  # example of a link without damping
-COMMENT_AT = 24  # column of a comment, if the value is no longer
-
-
 def first_file(tables: Mapping[str, Any]) -> str:
     """Return the text of an arm's file with these tables, each line with a comment, and examples of other tables."""
-    text = HEAD
+    head = "# An arm of tfarm, in SI units throughout.\n"
+    replaced = "density, youngs_modulus, shear_modulus or poissons_ratio in [link] replace the numbers of the material"
+    # example of a link without damping
+    undamped = "# damping = 0.0003"
+    text = head
     if (found := of_material(tables["link"])) is not None:
-        text += f"# {found[0].words(found[1])}\n# usual range: {found[0].range}\n# {REPLACED}\n"
+        text += f"# {found[0].words(found[1])}\n# usual range: {found[0].range}\n# {replaced}\n"
     for lines in toml_tables(tables):
         place = lines[0].strip("[]") if lines[0].startswith("[") else "top"
         if place == "link" and "damping" not in tables["link"]:
-            lines = [*lines, UNDAMPED]
+            lines = [*lines, undamped]
         text += "".join(["\n", *(f"{_commented(line, place)}\n" for line in lines)])
     return text + (files("tfarm.arm") / "first_file.txt").read_text("utf-8")
 
 
 def _commented(line: str, place: str) -> str:
     """Return a line of a table with unit and meaning of its key, or of the table, where they are declared."""
+    # column of a comment, if the value is no longer
+    comment_at = 24
     key = line.removeprefix("# ").partition(" = ")[0]
     words = file_keys().get(f"top.{place}" if key.startswith("[") else f"{place}.{key}")
     unit = f"[{words.unit}] " if words is not None and words.unit else ""
-    return line if words is None else f"{line:<{COMMENT_AT}}  # {unit}{words.help}"
+    return line if words is None else f"{line:<{comment_at}}  # {unit}{words.help}"

@@ -11,15 +11,13 @@ from tfarm.arm.chain import PERIOD, chain_of_tables, load_chain
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.reading import load, load_tables
 from tfarm.arm.schema import arm_of_table
+from tfarm.assessment.card import reference_damping
 from tfarm.dsp import Chain
 from tfarm.errors import require
 from tfarm.schema import Percent, Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.listing import listed_modes
 
-from .card import reference_damping
-
-LARGE_ERROR = 0.01  # of the first frequency by Euler-Bernoulli: a steel link of slenderness 20 has some 1.3 %
 DEFAULTS = {  # of the tables that a file may leave out
     "clamp": "rigid, no spring between hub and link",
     "joint": "rigid, no spring between drive and hub",
@@ -38,7 +36,9 @@ DEFAULTS = {  # of the tables that a file may leave out
 class Note(NamedTuple):
     """A key or table of a file, or a signal, and what there is to it."""
 
-    name: Annotated[str, Quantity("item", help="key with its value, heading of a table, or signal of the controller")]
+    name: Annotated[
+        str, Quantity("item", help="key with its value, heading of a table, or signal of the controller")
+    ]
     text: Annotated[str, Quantity("note", help="warning, default without the table, or factor of the signal")]
 
 
@@ -49,32 +49,61 @@ class ArmCheck:
     arm: Annotated[str, Quantity("arm", help="name of the arm")]
     theory: Annotated[str, Quantity("beam theory", help="timoshenko, shear, rayleigh or euler-bernoulli")]
     mass: Annotated[float, Quantity("mass of the link", "kg", 4, "of all segments", key="mass_kg")]
-    inertia: Annotated[float, Quantity("total inertia J", "kg m^2", 4, "of all parts, about the axis",
-                                       key="total_inertia_kg_m2")]  # fmt: skip
+    inertia: Annotated[
+        float,
+        Quantity("total inertia J", "kg m^2", 4, "of all parts, about the axis", key="total_inertia_kg_m2"),
+    ]
     slenderness: Annotated[
         float,
-        Quantity("slenderness", "", 4, "length over radius of gyration of the section, the least of all segments"),
+        Quantity(
+            "slenderness", "", 4, "length over radius of gyration of the section, the least of all segments"
+        ),
     ]
-    frequency: Annotated[float, Quantity("first flexible frequency", "rad/s", 6, "exact, of the undamped arm",
-                                         key="first_frequency_rad_s")]  # fmt: skip
-    frequency_hz: Annotated[float, Quantity("first frequency", "Hz", 6, "the same in hertz", key="first_frequency_hz")]
-    euler_bernoulli: Annotated[float, Quantity("by Euler-Bernoulli", "rad/s", 6, "without shear and rotary inertia",
-                                               key="euler_bernoulli_rad_s")]  # fmt: skip
-    error: Annotated[Percent, Quantity("error of Euler-Bernoulli", "", 3, "its frequency over the exact one, less 1",
-                                       key="euler_bernoulli_error")]  # fmt: skip
+    frequency: Annotated[
+        float,
+        Quantity(
+            "first flexible frequency", "rad/s", 6, "exact, of the undamped arm", key="first_frequency_rad_s"
+        ),
+    ]
+    frequency_hz: Annotated[
+        float, Quantity("first frequency", "Hz", 6, "the same in hertz", key="first_frequency_hz")
+    ]
+    euler_bernoulli: Annotated[
+        float,
+        Quantity(
+            "by Euler-Bernoulli", "rad/s", 6, "without shear and rotary inertia", key="euler_bernoulli_rad_s"
+        ),
+    ]
+    error: Annotated[
+        Percent,
+        Quantity(
+            "error of Euler-Bernoulli",
+            "",
+            3,
+            "its frequency over the exact one, less 1",
+            key="euler_bernoulli_error",
+        ),
+    ]
     damping_ratio: Annotated[
         Percent | None,
         Quantity("damping ratio of mode 1", "", 4, "exact, without controller; null where not determined"),
     ]
     period: Annotated[float, PERIOD]
-    torque_limit: Annotated[float, Quantity("limit of the input", "", 4, "of [actuator]; inf for none",
-                                            unit_of="input_unit")]  # fmt: skip
+    torque_limit: Annotated[
+        float, Quantity("limit of the input", "", 4, "of [actuator]; inf for none", unit_of="input_unit")
+    ]
     input_unit: Annotated[str, Quantity(help="SI unit of the arm's input")]
-    assumptions: Annotated[tuple[str, ...], Quantity("assumptions", help="of the file, and sources of its materials")]
+    assumptions: Annotated[
+        tuple[str, ...], Quantity("assumptions", help="of the file, and sources of its materials")
+    ]
     next_command: Annotated[str, Quantity("next", help="command to try next")]
-    warnings: Annotated[list[Note], Quantity("warnings", help="values that may have a wrong unit, and limits")]
+    warnings: Annotated[
+        list[Note], Quantity("warnings", help="values that may have a wrong unit, and limits")
+    ]
     law: Annotated[list[Note], Quantity("controller", help="signals of the file's law with their factors")]
-    missing: Annotated[list[Note], Quantity("missing tables", help="tables left out, and what is assumed instead")]
+    missing: Annotated[
+        list[Note], Quantity("missing tables", help="tables left out, and what is assumed instead")
+    ]
 
 
 def check_arm(name: str, theory: Theory | None = None) -> ArmCheck:
@@ -93,32 +122,48 @@ def check_arm(name: str, theory: Theory | None = None) -> ArmCheck:
     ratio = 0.0 if arm.is_undamped else first.damping_ratio
     slenderness = min(arm.length / link.section.radius_of_gyration for link in arm.links)
     return ArmCheck(
-        arm=arm.name, theory=arm.theory, mass=arm.own_mass, inertia=arm.total_inertia, slenderness=slenderness,
-        frequency=omega, frequency_hz=first.natural_frequency_hz, euler_bernoulli=of_bernoulli, error=error,
-        damping_ratio=None if ratio is None else Percent(ratio), assumptions=arm.assumptions,
-        period=chain.sampling.period, torque_limit=chain.actuator.torque_limit, input_unit=arm.input_unit,
+        arm=arm.name,
+        theory=arm.theory,
+        mass=arm.own_mass,
+        inertia=arm.total_inertia,
+        slenderness=slenderness,
+        frequency=omega,
+        frequency_hz=first.natural_frequency_hz,
+        euler_bernoulli=of_bernoulli,
+        error=error,
+        damping_ratio=None if ratio is None else Percent(ratio),
+        assumptions=arm.assumptions,
+        period=chain.sampling.period,
+        torque_limit=chain.actuator.torque_limit,
+        input_unit=arm.input_unit,
         next_command=f"tfarm {'modes' if arm.is_locked else 'margins'} {shlex.quote(name)}",
-        warnings=[Note(*text.split(": ", 1)) for text in _warnings(file.tables, arm, slenderness, error, chain, omega)],
+        warnings=[
+            Note(*text.split(": ", 1))
+            for text in _warnings(file.tables, arm, slenderness, error, chain, omega)
+        ],
         law=[] if law is None else [Note(*each) for each in law.as_typed()],
         missing=[Note(f"[{table}]", text) for table, text in DEFAULTS.items() if table not in file.tables],
-    )  # fmt: skip
+    )
 
 
 def _warnings(
     tables: Mapping[str, Any], arm: Arm, slenderness: float, error: float, chain: Chain, omega: float
 ) -> Iterator[str]:
     """Yield the warnings of an arm: a motor without input, values that may have a wrong unit, a short link, C = 0."""
+    # of the first frequency by Euler-Bernoulli: a steel link of slenderness 20 has some 1.3 %
+    large_error = 0.01
     if "motor" in tables and "input" not in tables:
         yield "input: hub_torque is assumed; with a [motor] give hub_torque, motor_voltage or motor_current"
     yield from implausible(arm)
-    if error > LARGE_ERROR:
+    if error > large_error:
         yield f"slenderness = {slenderness:.3g}: shear and rotary inertia count; Euler-Bernoulli leaves them out"
     if arm.has_elastic_link:
         yield (
             "link.damping = 0: undamped model, in which any delay destabilises a mode; "
             f"damping = {reference_damping(arm):.3g} in [link] is a damping ratio of 0.1 % in mode 1"
         )
-    if chain.sampling.period > (longest := math.pi / omega):  # samples cannot show the mode
+    # samples cannot show the mode
+    if chain.sampling.period > (longest := math.pi / omega):
         yield (
             f"sampling.period = {chain.sampling.period:g}: above half the period of the first mode, {longest:.3g} s, "
             "which is aliased; choose a tenth of that"
@@ -134,7 +179,10 @@ def with_damping(tables: dict[str, Any], ratio: float | None) -> dict[str, Any]:
     chain_of_tables(tables)
     if ratio is None:
         return tables
-    require(0 < ratio < 1, "--damping-ratio", ratio, "above 0 and below 1; 0.005 is 0.5 % of critical damping")
-    C = 2 * ratio / float(modes(arm, 1).natural_frequency[-1])  # of bending alone
+    require(
+        0 < ratio < 1, "--damping-ratio", ratio, "above 0 and below 1; 0.005 is 0.5 % of critical damping"
+    )
+    # of bending alone
+    C = 2 * ratio / float(modes(arm, 1).natural_frequency[-1])
     found = listed_modes(modes(arm.having(damping=C), 1)).modes[-1].damping_ratio or ratio
     return tables | {"link": {"damping": float(f"{C * ratio / found:.4g}")} | tables["link"]}

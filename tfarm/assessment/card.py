@@ -38,7 +38,8 @@ from tfarm.schema.html import as_html, with_symbols
 from tfarm.spectrum import modes
 from tfarm.spectrum.gains import default_gains
 
-GRADES = UNDEFINED, GOOD, LOW, POOR = "-", "good", "low", "poor"  # the first of a margin which is not defined
+# the first of a margin which is not defined
+GRADES = UNDEFINED, GOOD, LOW, POOR = "-", "good", "low", "poor"
 GRADED = {  # names of the graded margins in the grade of the loop
     "gain_margin": "gain margin",
     "gain_reduction": "gain margin downwards",
@@ -50,19 +51,18 @@ GAIN_LIMITS = (6.0, 3.0)
 PHASE_LIMITS = (45.0, 30.0)
 PERIOD_LIMITS = (1.0, 0.5)
 PEAK_LIMITS = (2.0, 3.0)
-REFERENCE_RATIO = 1e-3  # damping ratio of mode 1 with which an undamped arm is graded; less is small damping
 UNDAMPED = (
     "undamped model: margins and grades are those with C = {:.4g} s, 0.1 % of critical damping in mode 1; "
     "at C = 0 the exact delay and disk margins are 0 for every gain"
 )
-SCALED = "default gains: scaled from the paper's, not a design; "
-RECOMMENDED = "`tfarm design` recommends gains", "without damping of the link no design is robust"
 
 
 class Graded(NamedTuple):
     """A margin, the frequency [rad/s] that limits it, and its grade."""
 
-    value: Annotated[float | None, Quantity(help="size of the margin; inf without a limit, null where not defined")]
+    value: Annotated[
+        float | None, Quantity(help="size of the margin; inf without a limit, null where not defined")
+    ]
     omega: Annotated[float | None, Quantity(key="at_rad_s", help="frequency at which the margin is reached")]
     grade: Annotated[str, Quantity(help="good, low, poor, or - where not defined")]
 
@@ -71,7 +71,9 @@ class Graded(NamedTuple):
         if self.value is None:
             return UNDEFINED
         size = "no limit" if math.isinf(self.value) else text(self.value, digits)
-        return f"{size}{'' if self.omega is None else f' at {general(self.omega, digits)} rad/s'}, {self.grade}"
+        return (
+            f"{size}{'' if self.omega is None else f' at {general(self.omega, digits)} rad/s'}, {self.grade}"
+        )
 
 
 class LeastDamped(NamedTuple):
@@ -101,29 +103,100 @@ class LoopCard:
     """The numbers of one loop; its margins are not defined unless it is stable."""
 
     stability: Annotated[str, Quantity("stability", help="stable, marginal or unstable")]
-    grade: Annotated[str, Quantity("grade", help="worst grade of the margins: good, low, poor, or - without margins")]
-    limited_by: Annotated[tuple[str, ...], Quantity("limited by", help="margins with that grade, unless it is good")]
+    grade: Annotated[
+        str, Quantity("grade", help="worst grade of the margins: good, low, poor, or - without margins")
+    ]
+    limited_by: Annotated[
+        tuple[str, ...], Quantity("limited by", help="margins with that grade, unless it is good")
+    ]
     certainty: Annotated[str, Quantity("certainty", help="range of the verdict with its word of certainty")]
-    gain_margin: Annotated[Graded, Quantity("gain margin, upwards", "dB", 4, key="gain_margin_db",
-            help="increase of the loop gain up to which the loop stays stable")]  # fmt: skip
-    gain_reduction: Annotated[Graded, Quantity("gain margin, downwards", "dB", 4, key="gain_reduction_db",
-            help="reduction of the loop gain down to which the loop stays stable")]  # fmt: skip
-    phase_margin: Annotated[Graded, Quantity("phase margin", "deg", 4, key="phase_margin_deg",
-            help="least over all gain crossovers, of lag or of lead")]  # fmt: skip
-    delay_margin: Annotated[Graded, Quantity("delay margin", "ms", 4, key="delay_margin_ms",
-            help="smallest additional loop delay that destabilises the loop")]  # fmt: skip
-    delay_margin_periods: Annotated[float | None, Quantity("delay margin over sampling period", "", 4,
-            help="delay margin in sampling periods")]  # fmt: skip
-    peak_sensitivity: Annotated[Graded, Quantity("peak sensitivity Ms", "", 4,
-            help="largest abs(1/(1 + L)); its inverse is the distance of L from -1")]  # fmt: skip
-    disk_margin: Annotated[float | None, Quantity("disk margin", "", 4,
-            help="gain and phase together: factors (2 + d)/(2 - d), abs(d) < margin")]  # fmt: skip
-    least_damping: Annotated[LeastDamped | None, Quantity("least damping ratio", "", 4,
-            help="of the oscillating closed-loop poles in the range of the verdict")]  # fmt: skip
-    time_constant: Annotated[float | None, Quantity("dominant time constant", "s", 4, key="time_constant_s",
-            help="of the slowest closed-loop pole of a stable loop; without a free hub angle")]  # fmt: skip
-    minimum_damping: Annotated[float | None, Quantity("minimum structural damping for stability", "s", 4,
-            help="Kelvin-Voigt damping C of the link from which on the loop is stable")]  # fmt: skip
+    gain_margin: Annotated[
+        Graded,
+        Quantity(
+            "gain margin, upwards",
+            "dB",
+            4,
+            key="gain_margin_db",
+            help="increase of the loop gain up to which the loop stays stable",
+        ),
+    ]
+    gain_reduction: Annotated[
+        Graded,
+        Quantity(
+            "gain margin, downwards",
+            "dB",
+            4,
+            key="gain_reduction_db",
+            help="reduction of the loop gain down to which the loop stays stable",
+        ),
+    ]
+    phase_margin: Annotated[
+        Graded,
+        Quantity(
+            "phase margin",
+            "deg",
+            4,
+            key="phase_margin_deg",
+            help="least over all gain crossovers, of lag or of lead",
+        ),
+    ]
+    delay_margin: Annotated[
+        Graded,
+        Quantity(
+            "delay margin",
+            "ms",
+            4,
+            key="delay_margin_ms",
+            help="smallest additional loop delay that destabilises the loop",
+        ),
+    ]
+    delay_margin_periods: Annotated[
+        float | None,
+        Quantity("delay margin over sampling period", "", 4, help="delay margin in sampling periods"),
+    ]
+    peak_sensitivity: Annotated[
+        Graded,
+        Quantity(
+            "peak sensitivity Ms",
+            "",
+            4,
+            help="largest abs(1/(1 + L)); its inverse is the distance of L from -1",
+        ),
+    ]
+    disk_margin: Annotated[
+        float | None,
+        Quantity(
+            "disk margin", "", 4, help="gain and phase together: factors (2 + d)/(2 - d), abs(d) < margin"
+        ),
+    ]
+    least_damping: Annotated[
+        LeastDamped | None,
+        Quantity(
+            "least damping ratio",
+            "",
+            4,
+            help="of the oscillating closed-loop poles in the range of the verdict",
+        ),
+    ]
+    time_constant: Annotated[
+        float | None,
+        Quantity(
+            "dominant time constant",
+            "s",
+            4,
+            key="time_constant_s",
+            help="of the slowest closed-loop pole of a stable loop; without a free hub angle",
+        ),
+    ]
+    minimum_damping: Annotated[
+        float | None,
+        Quantity(
+            "minimum structural damping for stability",
+            "s",
+            4,
+            help="Kelvin-Voigt damping C of the link from which on the loop is stable",
+        ),
+    ]
 
     @property
     def finding(self) -> str:
@@ -140,7 +213,9 @@ class ResultCard(Tabled):
     continuous: Annotated[LoopCard | None, Quantity(help="continuous-time loop; null under a law in z")]
     sampled: Annotated[LoopCard | None, Quantity(help="sampled loop; null where it is not determined")]
     period: Annotated[float, Quantity(unit="s", help="sampling period")]
-    notes: Annotated[tuple[str, ...], Quantity(help="conditions of margins and grades, reasons of a missing loop")]
+    notes: Annotated[
+        tuple[str, ...], Quantity(help="conditions of margins and grades, reasons of a missing loop")
+    ]
 
     @property
     def loops(self) -> dict[str, LoopCard]:
@@ -175,9 +250,11 @@ def result_card(
     `continuous` (of `margins`) and `at_samples` (of `sampled`) are what is known of these loops already.  Raises
     ParameterError where there is no loop.
     """
+    scaled = "default gains: scaled from the paper's, not a design; "
+    recommended = "`tfarm design` recommends gains", "without damping of the link no design is robust"
     case = admit_case(SAMPLED_LOOP, Case(arm, law, chain))
     _, undamped = graded_arm(case.arm)
-    notes = [SCALED + RECOMMENDED[case.arm.has_elastic_link]] if case.gains == default_gains(case.arm) else []
+    notes = [scaled + recommended[case.arm.has_elastic_link]] if case.gains == default_gains(case.arm) else []
     notes += [undamped] if undamped else []
     known = {"continuous": continuous, "sampled": at_samples}
     cards: dict[str, LoopCard | None] = dict.fromkeys(known)
@@ -209,7 +286,9 @@ def loop_card(name: str, case: Case, known: Margins | Analysis | None = None) ->
 
 def reference_damping(arm: Arm) -> float:
     """Kelvin-Voigt damping C [s] with which the first mode of an undamped arm has the damping ratio 0.1 %."""
-    return 2 * REFERENCE_RATIO / float(modes(arm, 1).natural_frequency[-1])
+    # damping ratio of mode 1 with which an undamped arm is graded; less is small damping
+    reference_ratio = 1e-3
+    return 2 * reference_ratio / float(modes(arm, 1).natural_frequency[-1])
 
 
 def graded_arm(arm: Arm) -> tuple[Arm, str]:
@@ -240,7 +319,10 @@ def card_of(found: Margins | Analysis, chain: Chain, graded: Margins | Analysis 
 
 def words_of(verdict: LoopVerdict, chain: Chain) -> dict[str, Any]:
     """Return stability and certainty of a verdict on the loop of a chain."""
-    return {"stability": verdict.word, "certainty": f"{verdict.range_words}{not_covered(verdict.consumer, chain)}"}
+    return {
+        "stability": verdict.word,
+        "certainty": f"{verdict.range_words}{not_covered(verdict.consumer, chain)}",
+    }
 
 
 def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurve:
@@ -273,7 +355,9 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
     def as_card(name: str) -> LoopCurve:
         word = analysis_of(name, case).verdict.word
         curve = analysis_of(name, case.on(damped)).curve
-        return replace(curve, stability=word, note=note, margins=None if word == "unstable" else curve.margins)
+        return replace(
+            curve, stability=word, note=note, margins=None if word == "unstable" else curve.margins
+        )
 
     found = None if case.law.is_discrete else as_card("continuous")
     return found if found is not None and chain is None else replace(as_card("sampled"), continuous=found)

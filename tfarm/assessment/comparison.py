@@ -21,7 +21,14 @@ from tfarm.loop.margins import Margins
 from tfarm.loop.margins import margins as margins_of
 from tfarm.loop.plane import Plane, cell_middles, gain_map, plane, ranges_of
 from tfarm.loop.poles import HUB, closed_loop_poles, poles_by_mode
-from tfarm.loop.sampled_verdict import SAMPLED_LOOP, Analysis, SampledBrief, brief_of, sampled_brief, sampled_verdict
+from tfarm.loop.sampled_verdict import (
+    SAMPLED_LOOP,
+    Analysis,
+    SampledBrief,
+    brief_of,
+    sampled_brief,
+    sampled_verdict,
+)
 from tfarm.records import frozen
 from tfarm.response.frequency import Bode, bode, resonant_band
 from tfarm.schema import Difference, Percent, Quantity, compare_records
@@ -29,10 +36,7 @@ from tfarm.spectrum import damped_modes
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum.gains import default_gains
 
-MOST_COMPARED = 30  # flexible modes of a table that a person reads
-LONGEST_SIDE_NAME = 60  # characters of a name: of two in one legend
 # of a continuous-time controller: where that plane ends, and values that are counted
-MOST_FACTOR = 4.0
 FACTORS = 40
 
 
@@ -40,8 +44,12 @@ class ArmMode(NamedTuple):
     """A flexible mode of an arm by itself."""
 
     mode: Annotated[int, Quantity("mode", help="number of the flexible mode, ascending in frequency")]
-    frequency: Annotated[float, Quantity("natural frequency", "rad/s", help="without damping and without controller")]
-    damping_ratio: Annotated[Percent | None, Quantity("damping ratio", help="share of critical damping, no controller")]
+    frequency: Annotated[
+        float, Quantity("natural frequency", "rad/s", help="without damping and without controller")
+    ]
+    damping_ratio: Annotated[
+        Percent | None, Quantity("damping ratio", help="share of critical damping, no controller")
+    ]
 
 
 class PoleOfMode(NamedTuple):
@@ -129,12 +137,14 @@ class ComparedSide:
 
     def reach(self, delay: Real) -> list[Sequence[Window]]:
         """The intervals of a factor on the law in which its loop is stable, at each further delay [s]."""
+        # of a continuous-time controller: where that plane ends, and values that are counted
+        most_factor = 4.0
         if self.is_sampled:
             loop = cast("Analysis", self.loop).loop
             late = loop.chain.sampling.delay_samples + delay / loop.chain.sampling.period
             return [stable_windows(loop.with_delay(each), FACTOR) for each in late.tolist()]
         in_s = ContinuousLoop(self.case)
-        factors = cell_middles(0.0, MOST_FACTOR, FACTORS)
+        factors = cell_middles(0.0, most_factor, FACTORS)
         return [*plane(in_s, ("delay", "gain"), in_s.law.delay + delay, factors).stable_intervals]
 
 
@@ -143,8 +153,12 @@ class SideRow(NamedTuple):
 
     side: Annotated[str, Quantity()]
     name: Annotated[str, Quantity("name", help="arm, controller, or file of the controller")]
-    verdict: Annotated[str, Quantity("stability", help="of the continuous-time loop; of a law in z at its samples")]
-    reach: Annotated[str, Quantity("frequency range", help="range of the verdict where nothing is known beyond it")]
+    verdict: Annotated[
+        str, Quantity("stability", help="of the continuous-time loop; of a law in z at its samples")
+    ]
+    reach: Annotated[
+        str, Quantity("frequency range", help="range of the verdict where nothing is known beyond it")
+    ]
     sampled: Annotated[str, Quantity("sampled loop", help="verdict at the sampling period of the chain")]
 
 
@@ -173,8 +187,14 @@ class Comparison:
     @property
     def is_sampled(
         self,
-    ) -> Annotated[bool, Quantity("discrete-time comparison", key="at_samples",
-                                  help="where a law is in z: both loops at their samples, s = ln(z)/T")]:  # fmt: skip
+    ) -> Annotated[
+        bool,
+        Quantity(
+            "discrete-time comparison",
+            key="at_samples",
+            help="where a law is in z: both loops at their samples, s = ln(z)/T",
+        ),
+    ]:
         """Whether the loops are compared at their samples, one of the laws being a law in z."""
         return self.one.is_sampled
 
@@ -183,7 +203,9 @@ class Comparison:
         self,
     ) -> Annotated[
         list[SideRow],
-        Quantity("stability of both loops", first=True, key="sides", help="verdicts of both loops, a row each"),
+        Quantity(
+            "stability of both loops", first=True, key="sides", help="verdicts of both loops, a row each"
+        ),
     ]:
         """A row a side."""
         return [
@@ -195,17 +217,22 @@ class Comparison:
     def mode_differences(
         self,
     ) -> Annotated[
-        list[Difference], Quantity("modes of the arms", key="modes", help="flexible modes by number; none of one arm")
+        list[Difference],
+        Quantity("modes of the arms", key="modes", help="flexible modes by number; none of one arm"),
     ]:
         """Natural frequencies and damping ratios of both arms, by mode; of one arm none."""
-        return compare_records(self.one.arm_modes, self.other.arm_modes, self.names) if self.is_of_arms else []
+        return (
+            compare_records(self.one.arm_modes, self.other.arm_modes, self.names) if self.is_of_arms else []
+        )
 
     @property
     def pole_differences(
         self,
     ) -> Annotated[
         list[Difference],
-        Quantity("oscillating closed-loop poles", key="poles", help="pole pairs of both loops, by the nearest mode"),
+        Quantity(
+            "oscillating closed-loop poles", key="poles", help="pole pairs of both loops, by the nearest mode"
+        ),
     ]:
         """Those that both sides have, paired by mode."""
         one, other = ([row for row in side.named_poles if row.mode != "none"] for side in self.sides)
@@ -217,7 +244,8 @@ class Comparison:
     ) -> Annotated[
         list[LonePole],
         Quantity(
-            "unpaired closed-loop poles", help="pole pairs of a mode that the other loop has none of, or of no mode"
+            "unpaired closed-loop poles",
+            help="pole pairs of a mode that the other loop has none of, or of no mode",
         ),
     ]:
         """The other oscillating poles."""
@@ -263,7 +291,9 @@ class Comparison:
     def verdict(self) -> str:
         """Both verdicts, a line each."""
         each = ("" if self.is_sampled else f"{side.verdict}, " for side in self.sides)
-        return "\n".join(f"{s.name}: {verdict}{s.sampled.short}" for s, verdict in zip(self.sides, each, strict=True))
+        return "\n".join(
+            f"{s.name}: {verdict}{s.sampled.short}" for s, verdict in zip(self.sides, each, strict=True)
+        )
 
     @property
     def is_of_arms(self) -> bool:
@@ -284,12 +314,15 @@ class Comparison:
         if len(laws) < 2:
             return None
         axes = []
-        for n, (name, number) in enumerate(zip(PLANE, (80, 40), strict=True)):  # edges upwards are exact
-            own = [1.5 * law[name] for law in laws]  # the plane reaches that far beyond the controllers' own gains
+        # edges upwards are exact
+        for n, (name, number) in enumerate(zip(PLANE, (80, 40), strict=True)):
+            # the plane reaches that far beyond the controllers' own gains
+            own = [1.5 * law[name] for law in laws]
             low, high = zip(*(ranges_of(side.arm)[n] for side in self.sides), strict=True)
             axes.append(cell_middles(min(*low, *own), max(*high, *own), number))
         x, y = axes
-        x = np.union1d(x, [1e-6 * x[-1]])  # a column just beyond 0, from which most regions begin
+        # a column just beyond 0, from which most regions begin
+        x = np.union1d(x, [1e-6 * x[-1]])
         return [gain_map(side.arm, x, y, law.Kp) for side, law in zip(self.sides, laws, strict=True)]
 
     @cached_property
@@ -317,9 +350,13 @@ def compare(
     compared at their samples.  Raises ParameterError where there are not two, or where their laws close through
     different inputs, and what `tfarm.margins`, or then `tfarm.sampled`, raises for either.
     """
+    # flexible modes of a table that a person reads
+    most_compared = 30
+    # characters of a name: of two in one legend
+    longest_side_name = 60
     cases = _cases(arms, laws, chain)
-    modes = whole("modes", modes, 1, MOST_COMPARED, f"a whole number from 1 to {MOST_COMPARED}")
-    called = [one_line(name, LONGEST_SIDE_NAME) for name in names or _names(cases)]
+    modes = whole("modes", modes, 1, most_compared, f"a whole number from 1 to {most_compared}")
+    called = [one_line(name, longest_side_name) for name in names or _names(cases)]
     require(len(called) == 2, "names", called, "two names")
     first, second = (case.arm for case in cases)
     must_have_free_hub(first)
@@ -331,12 +368,16 @@ def compare(
     return Comparison(one, other, output)
 
 
-def _cases(arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None, chain: Chain | None) -> list[Case]:
+def _cases(
+    arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None, chain: Chain | None
+) -> list[Case]:
     """Return both arms with their laws."""
     given = _listed(arms)
     some = [] if laws is None else _listed(laws)
     is_two = 1 <= len(given) <= 2 and len(some) <= 2 and max(len(given), len(some)) == 2
-    require(is_two, "compare", f"{len(given)} arms, {len(some)} laws", "give two arms, or one arm and two laws")
+    require(
+        is_two, "compare", f"{len(given)} arms, {len(some)} laws", "give two arms, or one arm and two laws"
+    )
     pair = given * (2 // len(given))
     each = some * (2 // len(some)) if some else map(default_gains, pair)
     return [Case(arm, law, chain) for arm, law in zip(pair, each, strict=True)]
@@ -359,7 +400,8 @@ def _names(cases: list[Case]) -> Sequence[str]:
 
 def _side(name: str, case: Case, count: int, is_sampled: bool) -> ComparedSide:
     """Return all that is compared of one case; a sampled verdict that is not determined is left open."""
-    most = count + 6  # poles with Im s >= 0: also real ones, those of the hub, the motor and a controller
+    # poles with Im s >= 0: also real ones, those of the hub, the motor and a controller
+    most = count + 6
     case = admit_case(SAMPLED_LOOP, case)
     rows, open_loop = _modes_of_arm(case.arm, count, most)
     range_words = ""
@@ -415,8 +457,10 @@ def _sampled_poles(found: Analysis, most: int) -> tuple[Complex, dict[int, compl
     T = found.loop.chain.sampling.period
     pulse = found.loop.pulse
     z = found.loop.poles.z
-    z = np.where(abs(z.imag) <= 1e-12, z.real, z)  # but for rounding
-    s = np.log(z[(abs(z) > 1e-3) & (z.imag >= 0)]) / T  # of others a thousandth is left after a sample
+    # but for rounding
+    z = np.where(abs(z.imag) <= 1e-12, z.real, z)
+    # of others a thousandth is left after a sample
+    s = np.log(z[(abs(z) > 1e-3) & (z.imag >= 0)]) / T
     upper = pulse.poles.imag > 0
     own = np.log(pulse.multipliers[upper]) / T
     by_mode = zip(pulse.mode[upper].tolist(), (own.real + 1j * abs(own.imag)).tolist(), strict=True)

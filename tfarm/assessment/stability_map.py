@@ -16,7 +16,14 @@ from tfarm.arrays import Complex, Real
 from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
-from tfarm.loop.circle_crossings import GainMap, ends_of_K1, rounded_map, sampled_map, with_both_sides, with_more
+from tfarm.loop.circle_crossings import (
+    GainMap,
+    ends_of_K1,
+    rounded_map,
+    sampled_map,
+    with_both_sides,
+    with_more,
+)
 from tfarm.loop.plane import (
     Axis,
     BoundaryLines,
@@ -37,18 +44,24 @@ from tfarm.synthesis.judge import damping_of
 from tfarm.synthesis.models import continuous_model
 from tfarm.synthesis.structures import ONE, Entry
 
-K2_RANGE = (-1.0, 1.5)  # of the gain that balances a torque: 1 where the input is one, less for a motor's current
-CUT_RANGE = (-1.02, 1.52)  # of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
-OVERLAY_COLUMNS = 72  # values of the gain across, and either side of upright edges
-SAMPLED_COLUMNS = 120  # values of the gain across at which the sampled region is cut, besides its exact ends
-BEYOND_PICTURE = 0.1  # of the gain up the plane, beyond the picture: an edge there is none of the region
+# of the gain that balances a torque: 1 where the input is one, less for a motor's current
+K2_RANGE = (-1.0, 1.5)
+# of the same: where intervals are cut, just outside the picture: no cut is seen as an edge
+CUT_RANGE = (-1.02, 1.52)
+# values of the gain across, and either side of upright edges
+OVERLAY_COLUMNS = 72
+# values of the gain across at which the sampled region is cut, besides its exact ends
+SAMPLED_COLUMNS = 120
+# of the gain up the plane, beyond the picture: an edge there is none of the region
+BEYOND_PICTURE = 0.1
 
 
 class StableRegions(NamedTuple):
     """Both regions of one arm.  `sampled` has the arm's own C; at C = 0 also the regions with a little damping."""
 
     continuous: Plane
-    sampled: tuple[GainMap, ...]  # most damping first, so that each lies on the one before
+    # most damping first, so that each lies on the one before
+    sampled: tuple[GainMap, ...]
 
     @property
     def columns(self) -> list[Column]:
@@ -60,7 +73,10 @@ class StableRegions(NamedTuple):
             regions["sampled_K2_intervals" if own == C else f"sampled_at_C_{C:g}_s"] = plane.stable_intervals
         return [
             Column(PLANE[0], of=self.continuous.x),
-            *(Column(key, of=[tuple(map(float, np.ravel(x))) for x in each]) for key, each in regions.items()),
+            *(
+                Column(key, of=[tuple(map(float, np.ravel(x))) for x in each])
+                for key, each in regions.items()
+            ),
         ]
 
 
@@ -99,7 +115,9 @@ def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GainMap | None:
         across = with_both_sides(rate_columns(arm, x, SAMPLED_COLUMNS), ends_of_K1(loop))
         across = across[(x.low <= across) & (x.high > across)]
         up = np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
-        return outline_region(loop, across, up, lambda K1, K2: np.asarray(1.5 * x.place(K1) + 1j * y.place(K2)))
+        return outline_region(
+            loop, across, up, lambda K1, K2: np.asarray(1.5 * x.place(K1) + 1j * y.place(K2))
+        )
     except ConvergenceError:
         return None
 
@@ -112,7 +130,8 @@ def outline_region(loop: Sampled, across: Real, up: Real, drawn: Callable[[Real,
 # ------------------------------------------------------------ the map
 
 
-DESIGNED_MODES = 2  # flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
+# flexible modes in the band of the damping that is drawn and designed for, as `tfarm design` has it
+DESIGNED_MODES = 2
 # of the coloured grid
 GRID_COLUMNS = 240
 GRID_ROWS = 200
@@ -146,7 +165,9 @@ class StabilityMap:
             for K1, K2, count, ratio in zip(*map(np.ravel, values), strict=True)
         ]
         rows += [
-            ("boundary", K1, K2, "", "", omega) for K1, K2, omega in self.boundary.points.tolist() if not math.isnan(K1)
+            ("boundary", K1, K2, "", "", omega)
+            for K1, K2, omega in self.boundary.points.tolist()
+            if not math.isnan(K1)
         ]
         rate = "_".join([PLANE[0], *shown_unit(PLANE[0], self.arm).replace("/", " ").split()])
         keys = "what", rate, PLANE[1], "unstable_poles", "least_damping_ratio", "omega_rad_s"
@@ -159,7 +180,9 @@ def stability_map(arm: Arm, chain: Chain) -> StabilityMap:
     y = moment_axis(arm, x)
     found = gain_map(arm, x.grid(GRID_COLUMNS), y.grid(GRID_ROWS))
     # damping at one in four of its values
-    across, up = (np.r_[axis.low, each[2::4], axis.high] for axis, each in zip((x, y), found.axes, strict=True))
+    across, up = (
+        np.r_[axis.low, each[2::4], axis.high] for axis, each in zip((x, y), found.axes, strict=True)
+    )
     coarse = gain_map(arm, across, up)
     sampled = sampled_region(arm, x, y, chain)
     return StabilityMap(arm, x, y, found, boundary_lines(found, x, y), coarse, least_damping(coarse), sampled)

@@ -30,6 +30,7 @@ from tfarm.arm.checks import number
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import LEAST_SIZE, Real
+from tfarm.assessment.card import loop_names
 from tfarm.case import Case
 from tfarm.digits import general
 from tfarm.dsp import Chain, traces
@@ -59,27 +60,36 @@ from tfarm.schema import Column, Percent, Quantity, Table, across
 from tfarm.schema.html import as_html
 from tfarm.spectrum.table import first_frequency
 
-from .card import loop_names
-
 CONSUMER = Consumer(
     "step",
     acts=(
-        "reference", "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "law",
-        "arithmetic", "DAC steps", "DAC range", "torque limit", "hold", "delay", "hub damping", "plant",
+        "reference",
+        "anti-alias filter",
+        "encoder",
+        "hub rate",
+        "amplifier steps",
+        "amplifier range",
+        "law",
+        "arithmetic",
+        "DAC steps",
+        "DAC range",
+        "torque limit",
+        "hold",
+        "delay",
+        "hub damping",
+        "plant",
     ),
     none=("volts",),
-)  # fmt: skip
-SAMPLED_NAMES = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}  # by scenario
+)
+# by scenario
+SAMPLED_NAMES = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}
 MOMENT = AT_HUB[-1]
 UNSTABLE = "unstable"
-SignalCurve = tuple[
-    Real, Real, Real, Peak | None
-]  # times [s], values, bounds of their errors, and the peak where known
+# times [s], values, bounds of their errors, and the peak where known
+SignalCurve = tuple[Real, Real, Real, Peak | None]
 PARTS = ("hub", "tip", "root_moment", "torque")
-TIME_CONSTANTS = 8.0  # of the dominant pole: length of a record after its input, to 3e-4 of the final value
-CONVERGED = 1e-6  # of the peak of each signal: bound on its error, everywhere in the record, of a converged response
-OPEN = 0.01  # of a figure: more than its error may be is not determined
-RESOLVED = 1e-3  # of the largest value of a signal: figures of its values below a hundredth of that are 0
+# of a figure: more than its error may be is not determined
+OPEN = 0.01
 
 
 class Millimetres(float):
@@ -96,27 +106,78 @@ class SignalFigures:
 
     signal: Annotated[str, Quantity(help="output of the arm, or torque for its input")]
     unit: Annotated[str, Quantity(help="SI unit of the values of the signal")]
-    peak: Annotated[float | None, Quantity("peak", digits=6, unit_of="unit",
-            help="largest value in size, with its sign, on both sides of jumps")]  # fmt: skip
+    peak: Annotated[
+        float | None,
+        Quantity(
+            "peak",
+            digits=6,
+            unit_of="unit",
+            help="largest value in size, with its sign, on both sides of jumps",
+        ),
+    ]
     peak_time: Annotated[float | None, Quantity("peak time", "s", 4, help="time of the peak")]
-    final_value: Annotated[float | None, Quantity("final value", digits=4, unit_of="unit",
-            help="mean over the last tenth of the record; none where the signal has not settled")]  # fmt: skip
-    rise_time: Annotated[float | None, Quantity("rise time (10-90 %)", "s", 4,
-            help="time from 10 to 90 % of the final value, of a signal with a reference")]  # fmt: skip
-    overshoot: Annotated[Percent | None, Quantity("overshoot", "", 4,
-            help="excess of the largest value over the final one, as a share of that")]  # fmt: skip
-    settling_time: Annotated[float | None, Quantity("settling time", "s", 4,
+    final_value: Annotated[
+        float | None,
+        Quantity(
+            "final value",
+            digits=4,
+            unit_of="unit",
+            help="mean over the last tenth of the record; none where the signal has not settled",
+        ),
+    ]
+    rise_time: Annotated[
+        float | None,
+        Quantity(
+            "rise time (10-90 %)",
+            "s",
+            4,
+            help="time from 10 to 90 % of the final value, of a signal with a reference",
+        ),
+    ]
+    overshoot: Annotated[
+        Percent | None,
+        Quantity(
+            "overshoot", "", 4, help="excess of the largest value over the final one, as a share of that"
+        ),
+    ]
+    settling_time: Annotated[
+        float | None,
+        Quantity(
+            "settling time",
+            "s",
+            4,
             help="time from the end of the motion after which deviations stay within the settling band of the travel, "
-            "or of the largest deviation where there is no reference")]  # fmt: skip
-    at_rest_after: Annotated[float | None, Quantity("at rest after", "s", 4,
-            help="end of the motion plus settling time")]  # fmt: skip
-    steady_state_error: Annotated[float | None, Quantity("steady-state error", digits=4, unit_of="unit",
-            help="reference less final value")]  # fmt: skip
-    residual_rms: Annotated[float | None, Quantity("residual vibration (rms)", digits=4, unit_of="residual_unit",
-            help="rms about the final value once the slew or the pulse is over")]  # fmt: skip
-    remainder_bound: Annotated[float | None, Quantity("remainder bound at the peak", digits=2, unit_of="unit",
-            help="of the error at the peak, as measured; at least the rounding of the peak")]  # fmt: skip
-    note: Annotated[str | None, Quantity("not determined", help="figures without a value, with their reason")] = None
+            "or of the largest deviation where there is no reference",
+        ),
+    ]
+    at_rest_after: Annotated[
+        float | None, Quantity("at rest after", "s", 4, help="end of the motion plus settling time")
+    ]
+    steady_state_error: Annotated[
+        float | None,
+        Quantity("steady-state error", digits=4, unit_of="unit", help="reference less final value"),
+    ]
+    residual_rms: Annotated[
+        float | None,
+        Quantity(
+            "residual vibration (rms)",
+            digits=4,
+            unit_of="residual_unit",
+            help="rms about the final value once the slew or the pulse is over",
+        ),
+    ]
+    remainder_bound: Annotated[
+        float | None,
+        Quantity(
+            "remainder bound at the peak",
+            digits=2,
+            unit_of="unit",
+            help="of the error at the peak, as measured; at least the rounding of the peak",
+        ),
+    ]
+    note: Annotated[
+        str | None, Quantity("not determined", help="figures without a value, with their reason")
+    ] = None
 
     @property
     def residual_unit(self) -> str:
@@ -129,16 +190,24 @@ class LoopResponse:
     """Figures of one loop, not defined of an unstable one, and its signals by name, "torque" being the input."""
 
     stability: Annotated[str, Quantity("stability", help="stable, marginal or unstable")]
-    certainty: Annotated[str, Quantity("certainty",
-            help="by the remainder of the poles or by twice the modes, with their number")]  # fmt: skip
+    certainty: Annotated[
+        str,
+        Quantity("certainty", help="by the remainder of the poles or by twice the modes, with their number"),
+    ]
     signals: dict[str, Real]
-    hub: Annotated[SignalFigures | None, Quantity("hub",
-            help="hub angle, or hub rate where that is the reference")] = None  # fmt: skip
-    tip: Annotated[SignalFigures | None, Quantity("tip",
-            help="tip displacement, or its velocity under a hub rate")] = None  # fmt: skip
-    root_moment: Annotated[SignalFigures | None, Quantity("root moment", help="elastic moment at the root")] = None
-    torque: Annotated[SignalFigures | None, Quantity("torque",
-            help="input of the arm by the motor: torque, voltage or current")] = None  # fmt: skip
+    hub: Annotated[
+        SignalFigures | None, Quantity("hub", help="hub angle, or hub rate where that is the reference")
+    ] = None
+    tip: Annotated[
+        SignalFigures | None, Quantity("tip", help="tip displacement, or its velocity under a hub rate")
+    ] = None
+    root_moment: Annotated[
+        SignalFigures | None, Quantity("root moment", help="elastic moment at the root")
+    ] = None
+    torque: Annotated[
+        SignalFigures | None,
+        Quantity("torque", help="input of the arm by the motor: torque, voltage or current"),
+    ] = None
 
 
 @dataclass(frozen=True)
@@ -157,6 +226,8 @@ class _LoopRecord:
 
     def _of_continuous(self, response: TimeResponse, omitted: str) -> LoopResponse:
         """The continuous-time loop; `omitted` ends its certainty."""
+        # of the peak of each signal: bound on its error, everywhere in the record, of a converged response
+        converged = 1e-6
         t = np.union1d(self.t, response.near_starts(float(self.t[-1])))
         y = response.at(t)
         t = np.union1d(t, self._crossings(t, dict(zip(response.names, y, strict=True))))
@@ -165,7 +236,7 @@ class _LoopRecord:
         peaks = response.peaks(t)
         curves = {name: (t, y[n], bound[n], peaks[name]) for n, name in enumerate(response.names)}
         is_converged = all(
-            (error <= CONVERGED * abs(peak.value)).all() and peak.bound <= CONVERGED * abs(peak.value)
+            (error <= converged * abs(peak.value)).all() and peak.bound <= converged * abs(peak.value)
             for _, _, error, peak in curves.values()
         )
         word = verdict_on(response.poles.loop).word
@@ -183,7 +254,9 @@ class _LoopRecord:
         curves = {name: (self.t[: y.size], y, 0 * y, None) for name, y in signals.items()}
         return self._loop(word, is_converged, f"{used.modes} modes", curves)
 
-    def _loop(self, stability: str, is_converged: bool, count: str, curves: Mapping[str, SignalCurve]) -> LoopResponse:
+    def _loop(
+        self, stability: str, is_converged: bool, count: str, curves: Mapping[str, SignalCurve]
+    ) -> LoopResponse:
         """The figures of a loop; of an unstable one those of its signals are left out."""
         names = zip(PARTS, self.names, strict=True) if stability != UNSTABLE else ()
         of = {part: self._figures(name, *curves[name]) for part, name in names}
@@ -193,6 +266,8 @@ class _LoopRecord:
 
     def _figures(self, name: str, t: Real, y: Real, bound: Real, peak: Peak | None = None) -> SignalFigures:
         """Figures of one signal at times `t` with a bound on its error; its peak is the largest there unless given."""
+        # of the largest value of a signal: figures of its values below a hundredth of that are 0
+        resolved = 1e-3
         n = int(abs(y).argmax())
         peak = peak or Peak(float(t[n]), float(y[n]), 0.0, abs(float(y[n])))
         size = max(abs(peak.value), LEAST_SIZE)
@@ -202,11 +277,15 @@ class _LoopRecord:
         above = self._values(name, t, y, bound)
         least = {"overshoot": 0.01, "settling_time": step / OPEN, "rise_time": step / OPEN}
         spread = {
-            key: _spread(value, (below[key], above[key]), least.get(key, RESOLVED * size))
+            key: _spread(value, (below[key], above[key]), least.get(key, resolved * size))
             for key, value in known.items()
         }
         spread["peak"] = (peak.most - abs(peak.value) + peak.bound) / size
-        largest = t[abs(y) + bound >= abs(peak.value) - peak.bound] if peak.bound > RESOLVED * OPEN * size else t[:0]
+        largest = (
+            t[abs(y) + bound >= abs(peak.value) - peak.bound]
+            if peak.bound > resolved * OPEN * size
+            else t[:0]
+        )
         late = float(np.ptp(np.r_[peak.time, largest])) - 2 * step
         spread["peak_time"] = late / max(peak.time, self.t[-1] / 10)
         known |= {"peak": peak.value, "peak_time": peak.time}
@@ -237,7 +316,9 @@ class _LoopRecord:
         values: dict[str, Any] = {**dict.fromkeys(names), "settling_time": settled}
         if self.busy_until and after.sum() > 1:
             unit = Millimetres if name == "tip_displacement" else float
-            values["residual_rms"] = unit(np.sqrt(np.trapezoid((y - final)[after] ** 2, t[after]) / np.ptp(t[after])))
+            values["residual_rms"] = unit(
+                np.sqrt(np.trapezoid((y - final)[after] ** 2, t[after]) / np.ptp(t[after]))
+            )
         if settled is not None:
             final += float(more.mean())
             values["final_value"] = final if name != MOMENT or not self.arm.has_rigid_mode else None
@@ -295,11 +376,17 @@ class Step(_LoopRecord):
     def finding(self) -> Annotated[str, Quantity("finding", help="stability of each loop")]:
         """Stability of each loop."""
         grows = " (the response grows, its figures are not defined)"
-        return "; ".join(f"{name} {each.stability}{'' if each.hub else grows}" for name, each in self.loops.items())
+        return "; ".join(
+            f"{name} {each.stability}{'' if each.hub else grows}" for name, each in self.loops.items()
+        )
 
     @property
-    def settling_band(self) -> Annotated[Percent, Quantity("settling band", digits=3,
-            help="share of the travel within which a signal has settled")]:  # fmt: skip
+    def settling_band(
+        self,
+    ) -> Annotated[
+        Percent,
+        Quantity("settling band", digits=3, help="share of the travel within which a signal has settled"),
+    ]:
         """Share of the travel within which a signal has settled."""
         return Percent(self.band)
 
@@ -312,7 +399,11 @@ class Step(_LoopRecord):
     def csv_table(self) -> Table:
         """The signals of both loops at the same times, empty where a run was stopped."""
         signals = (
-            Column(prefix + name, unit=signal_unit(self.arm, name), of=[*y.tolist(), *[""] * (self.t.size - y.size)])
+            Column(
+                prefix + name,
+                unit=signal_unit(self.arm, name),
+                of=[*y.tolist(), *[""] * (self.t.size - y.size)],
+            )
             for prefix, loop in (("", self.continuous), ("sampled_", self.sampled))
             for name, y in (loop.signals.items() if loop else ())
         )
@@ -364,7 +455,9 @@ def step(
     """
     must_be_known("scenario", scenario_name, SAMPLED_NAMES)
     band = number("settling_band", settling_band, "a share of the travel, such as 0.02")
-    require(0 < band < 1, "settling_band", settling_band, "a share of the travel between 0 and 1, such as 0.02")
+    require(
+        0 < band < 1, "settling_band", settling_band, "a share of the travel between 0 and 1, such as 0.02"
+    )
     case = admit_case(CONSUMER, Case(arm, law, chain))
     is_step = scenario_name == "reference"
     hub = AT_HUB[0]
@@ -384,7 +477,9 @@ def step(
     tip = "tip_displacement" if of_angle else f"velocity@{arm.length!r}"
     names = tuple(dict.fromkeys((hub, tip, MOMENT, *outputs)))
     if task.tip_offset:
-        first_mode(sensed_plant(arm, Chain(), ("tip_displacement",), 1).unfiltered, task.tip_offset, scenario_name)
+        first_mode(
+            sensed_plant(arm, Chain(), ("tip_displacement",), 1).unfiltered, task.tip_offset, scenario_name
+        )
     response = None
     if poles is not None:
         response = time_response(poles, names, excitation(poles.loop, case, task, names), length)
@@ -393,11 +488,18 @@ def step(
     reference = {hub: angle, tip: arm.reach * angle} if is_step or scenario_name == "slew" else {}
     found = _LoopRecord(arm, (*names[:3], TORQUE), task.busy_until, t, reference, band)
     return Step(
-        **vars(found), controller=controller(case.law, arm), scenario=scenario_name, period=task.period,
-        duration=min(length, float(t[-1])), scenario_in_words=describe_scenario(task, arm, chain), response=response,
+        **vars(found),
+        controller=controller(case.law, arm),
+        scenario=scenario_name,
+        period=task.period,
+        duration=min(length, float(t[-1])),
+        scenario_in_words=describe_scenario(task, arm, chain),
+        response=response,
         sampled=found._of_sampled(case, task, names),
-        continuous=None if response is None else found._of_continuous(response, not_covered(CONTINUOUS, chain)),
-    )  # fmt: skip
+        continuous=None
+        if response is None
+        else found._of_continuous(response, not_covered(CONTINUOUS, chain)),
+    )
 
 
 def step_reference(law: Law) -> tuple[str, Law]:
@@ -414,14 +516,17 @@ def step_reference(law: Law) -> tuple[str, Law]:
 
 def usual_duration(poles: Poles | None, chain: Chain) -> float:
     """Length [s] of a record: a slew and eight time constants of the dominant pole, to two digits."""
+    # of the dominant pole: length of a record after its input, to 3e-4 of the final value
+    time_constants = 8.0
     rise = chain.slew.rise_time
     if poles is None:
         return TRIAL_SLEWS * rise
     sizes = abs(poles.moving)
     # a pole farther away than twice the first frequency is not the dominant one
     near = poles.moving[sizes <= 2.0 * max(first_frequency(poles.loop.arm), sizes.min(initial=math.inf))]
-    decay = max(abs(near.real).min(initial=math.inf), TIME_CONSTANTS / (20.0 * rise))  # at most 20 slews
-    return float(f"{rise + TIME_CONSTANTS / decay:.2g}")
+    # at most 20 slews
+    decay = max(abs(near.real).min(initial=math.inf), time_constants / (20.0 * rise))
+    return float(f"{rise + time_constants / decay:.2g}")
 
 
 def excitation(loop: ContinuousLoop, case: Case, task: Scenario, names: Sequence[str]) -> Excitation:
@@ -447,8 +552,10 @@ def excitation(loop: ContinuousLoop, case: Case, task: Scenario, names: Sequence
     a = case.chain.slew.acceleration(arm.reach)
     read = arm.gauged_inertia * float(task.reading == "vibration")
     references: dict[str, Transform] = {
-        angle: lambda s: 1 / s**3, rate: lambda s: 1 / s**2, moment: lambda s: -read / s
-    }  # fmt: skip
+        angle: lambda s: 1 / s**3,
+        rate: lambda s: 1 / s**2,
+        moment: lambda s: -read / s,
+    }
     inputs = {**_through(law, references), ACTUATOR: lambda s: arm.turned_inertia / s + arm.rate_loss / s**2}
     return Excitation(inputs, (0.0, rise / 2, rise), (a, -2 * a, a))
 

@@ -9,11 +9,11 @@ What needs SymPy is loaded when it is asked for: a report's processes want this 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from .kept import kept_audit
-from .rows import AuditRow, is_zero
+from tfarm.audit.kept import kept_audit
+from tfarm.audit.rows import AuditRow, is_zero
 
 if TYPE_CHECKING:
-    from .paper import PAPER, Audit, Claim, audit, claims
+    from tfarm.audit.paper import PAPER, Audit, Claim, audit, claims
 
 __all__ = ["PAPER", "Audit", "AuditRow", "Claim", "audit", "claims", "is_zero", "kept_audit"]
 

@@ -20,9 +20,12 @@ from tfarm.spectrum.proofs import Certificate
 
 PROVEN_OUTPUTS = ("root_moment", "tip_displacement")
 UNPROVEN = "not proven"
-PROVEN_MODES = 10  # flexible modes of each arm, as its page lists them
-BRACKET_DIGITS = 20  # of a natural frequency: beyond a double's digits
-PROVEN_DIGITS = 12  # of an eigenvalue: more than a page prints of any
+# flexible modes of each arm, as its page lists them
+PROVEN_MODES = 10
+# of a natural frequency: beyond a double's digits
+BRACKET_DIGITS = 20
+# of an eigenvalue: more than a page prints of any
+PROVEN_DIGITS = 12
 
 
 @lru_cache(maxsize=8)  # for the arm's page and its proof, as the damped ones below
@@ -47,14 +50,19 @@ class Boxed:
     """Eigenvalues proven complete in a box: each in a disc, `count` in all.  `failure`: what could not be proven."""
 
     arm: Annotated[str, Quantity("arm", help="name of the arm")]
-    what: Annotated[str, Quantity("eigenvalues", help="damped modes of the arm, or poles of its default loop")]
+    what: Annotated[
+        str, Quantity("eigenvalues", help="damped modes of the arm, or poles of its default loop")
+    ]
     count: Annotated[
         int, Quantity("counted", help="eigenvalues in the box by the argument principle, conjugates counted")
     ] = 0
     box: Annotated[
         list[float],
         Quantity(
-            "box: Re s from, to, Im s from, to", "1/s", 4, help="rectangle of the s-plane in which none is missing"
+            "box: Re s from, to, Im s from, to",
+            "1/s",
+            4,
+            help="rectangle of the s-plane in which none is missing",
         ),
     ] = field(default_factory=list)
     failure: str = ""
@@ -76,9 +84,12 @@ class ArmProof:
     """
 
     name: Annotated[str, Quantity("arm", help="name of the arm")]
-    sha256: Annotated[str, Quantity("SHA-256 of arm.toml", help="hash of the arm's file, on which its page depends")]
+    sha256: Annotated[
+        str, Quantity("SHA-256 of arm.toml", help="hash of the arm's file, on which its page depends")
+    ]
     has_rigid_mode: Annotated[
-        bool, Quantity("rigid body", help="whether the arm turns freely as a rigid body, with natural frequency 0")
+        bool,
+        Quantity("rigid body", help="whether the arm turns freely as a rigid body, with natural frequency 0"),
     ]
     digits: int = BRACKET_DIGITS
     brackets: tuple[tuple[str, str], ...] = ()
@@ -94,7 +105,9 @@ class ArmProof:
     @property
     def enclosed(
         self,
-    ) -> Annotated[int, Quantity("flexible modes enclosed", help="natural frequencies between two proven bounds each")]:
+    ) -> Annotated[
+        int, Quantity("flexible modes enclosed", help="natural frequencies between two proven bounds each")
+    ]:
         """The number of brackets."""
         return len(self.brackets)
 
@@ -111,7 +124,9 @@ class ArmProof:
         return f"{UNPROVEN}: {self.failure}" if self.failure else "complete, proven"
 
     @property
-    def source(self) -> Annotated[str, Quantity("source", help="preset, where the file is that of one byte for byte")]:
+    def source(
+        self,
+    ) -> Annotated[str, Quantity("source", help="preset, where the file is that of one byte for byte")]:
         """Whether the arm's file is, byte for byte, that of a preset."""
         return "preset" if self.name in presets() and hash_of(load(self.name)) == self.sha256 else "file"
 
@@ -120,7 +135,9 @@ class ArmProof:
         """The proven digits of each bracket: its lower end cut off, with its zeros."""
         with localcontext(prec=self.digits + 5):
             lower = [Decimal(bracket[0]) for bracket in self.brackets]
-            return [f"{each.quantize(Decimal(1).scaleb(each.adjusted() - self.digits + 1)):f}" for each in lower]
+            return [
+                f"{each.quantize(Decimal(1).scaleb(each.adjusted() - self.digits + 1)):f}" for each in lower
+            ]
 
 
 def prove(arm: Arm, chain: Chain | None = None) -> ArmProof:

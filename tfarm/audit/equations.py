@@ -13,7 +13,7 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from .formulas import (
+from tfarm.audit.formulas import (
     AT_ROOT,
     AT_TIP,
     PAPER_UNITS,
@@ -38,7 +38,7 @@ from .formulas import (
     symbols,
     x,
 )
-from .rows import formula_of
+from tfarm.audit.rows import formula_of
 
 DENSITY = (  # kinetic minus potential energy a length, from w = y + x theta and psi = phi + theta
     "rho*A/2*(y_t + x*theta_t)^2 + rho*I/2*(phi_t + theta_t)^2 - E*I/2*phi_x^2 - kappa*G*A/2*(y_x - phi)^2"
@@ -63,7 +63,9 @@ def along_arm(field: str, text: str) -> str:
 def at_tip(field: str, text: str) -> str:
     """(4), (5): against the natural end condition, payload's inertia against the density's flux."""
     inertia = d_dt(sp.diff(parse_expression(PAYLOAD), jet(field, t=1, at=AT_TIP)))
-    return remainder(at_running_point(inertia - difference(text)) - sp.diff(parse_expression(DENSITY), jet(field, x=1)))
+    return remainder(
+        at_running_point(inertia - difference(text)) - sp.diff(parse_expression(DENSITY), jet(field, x=1))
+    )
 
 
 def at_hub(text: str) -> str:
@@ -73,7 +75,9 @@ def at_hub(text: str) -> str:
         parse_expression(PAYLOAD), theta_t
     )
     inside, outside = integral_parts(d_dt(momentum))
-    of_link = sp.Function("integral")(sp.expand(inside.subs(accelerations()))) + outside.subs(accelerations(AT_TIP))
+    of_link = sp.Function("integral")(sp.expand(inside.subs(accelerations()))) + outside.subs(
+        accelerations(AT_TIP)
+    )
     return balance_residual(symbol("I_h") * jet("theta", t=2) - symbol("u") + of_link - difference(text))
 
 
@@ -89,7 +93,10 @@ def is_transform(number: int, text: str) -> str:
     """(8)-(14): against the Laplace transform of (1)-(7), which are linear, from rest."""
     f = equation(number - 7)
     names = {"y": "Y", "phi": "Phi", "theta": "Theta"}
-    images = {s: symbol("s") ** j * jet(names[field], i, 0, at.replace(",t)", ",s)")) for s, field, i, j, at in jets(f)}
+    images = {
+        s: symbol("s") ** j * jet(names[field], i, 0, at.replace(",t)", ",s)"))
+        for s, field, i, j, at in jets(f)
+    }
     return remainder(f.subs(images | {symbol("u"): symbol("U")}, simultaneous=True) - difference(text))
 
 
@@ -102,7 +109,8 @@ def accelerations(at: str = "") -> dict[Expression, Expression]:
 
 
 WAVES = formula_of("(A.1)")
-BEAM_DIGITS = 50  # of both methods; RESIDUAL_NOISE leaves half of them to rounding
+# of both methods; RESIDUAL_NOISE leaves half of them to rounding
+BEAM_DIGITS = 50
 BEAM_NAMES = ["rho", "A", "L", "E", "I", "kappa", "G", "C", "m", "I_c", "I_h", "s"]
 BEAMS = (  # payload and damping, orders of one, so that no term hides; s on and off the axis
     "1.3 0.7 1.1 2.9 0.31 0.83 1.7 0.013 0.37 0.053 0.23 0.9+2.3j",
@@ -159,7 +167,9 @@ def is_dispersion(text: str) -> str:
     right = next(iter(sides(text).values()))
     square = sp.expand(right**2)
     polynomial = sum(c * square ** (n // 2) for (n,), c in wave_determinant().terms())
-    signs = [sp.expand(sp.numer(sp.together(sp.expand(polynomial.subs(symbol("pm"), sign))))) for sign in (1, -1)]
+    signs = [
+        sp.expand(sp.numer(sp.together(sp.expand(polynomial.subs(symbol("pm"), sign))))) for sign in (1, -1)
+    ]
     root = "0" if signs == [0, 0] else "lambda is no root of the determinant of (8), (9)"
     return residual_text([mismatch(right, PAPER_UNITS), root])
 
@@ -209,12 +219,18 @@ def by_transition(v: dict[str, Any]) -> list[Any]:
     rho, A, length, E, I, kappa, G, C, m, I_c, I_h, s = (v[name] for name in BEAM_NAMES)
     s2 = s**2
     EI = E * (1 + C * s) * I
-    rows = [[0, 1, 1 / (kappa * G * A), 0], [0, 0, 0, 1 / EI], [rho * A * s2, 0, 0, 0], [0, rho * I * s2, -1, 0]]
+    rows = [
+        [0, 1, 1 / (kappa * G * A), 0],
+        [0, 0, 0, 1 / EI],
+        [rho * A * s2, 0, 0, 0],
+        [0, rho * I * s2, -1, 0],
+    ]
     T = mpmath.expm(mpmath.matrix(rows) * length)
     free = mpmath.matrix([[0, 0], [1, 0], [0, 1], [I_h * s2, 0]])
     torque = mpmath.matrix([0, 0, 0, -1])
     tip = mpmath.matrix([[m * s2, 0, 1, 0], [0, I_c * s2, 0, 1]]) * T
-    found = mpmath.lu_solve(tip * free, -tip * torque)  # theta and Q(0)
+    # theta and Q(0)
+    found = mpmath.lu_solve(tip * free, -tip * torque)
     w, psi, _, _ = T * (free * found + torque)
     return [found[0], w, psi, I_h * s2 * found[0] - 1]
 
@@ -227,15 +243,24 @@ def by_appendix(text: str, v: dict[str, Any]) -> list[Any]:
         return f.evalf(BEAM_DIGITS, subs=values)
 
     square = sp.expand((sides(text)[symbol("lambda_")] / symbol("pm")) ** 2)
-    values |= {symbol(f"lambda_{i}"): number(sp.sqrt(square.subs(symbol("pm"), sign))) for i, sign in ((1, 1), (2, -1))}
+    values |= {
+        symbol(f"lambda_{i}"): number(sp.sqrt(square.subs(symbol("pm"), sign)))
+        for i, sign in ((1, 1), (2, -1))
+    }
     values |= {name: number(right) for name, right in sides(formula_of("a_ij")).items()}
     Delta, *Delta_k = map(number, determinants(formula_of("Delta, Delta k_i")).values())
     values |= {symbol(f"k{i}"): each / Delta for i, each in enumerate(Delta_k, start=1)}
     Y, Phi = waves_of(text).values()
     Theta = symbol("Theta")
-    at_root = sp.solve(Phi.subs(x, 0), Theta)[0]  # by (14)
+    # by (14)
+    at_root = sp.solve(Phi.subs(x, 0), Theta)[0]
     psi, w = (motion.subs(Theta, at_root) for motion in (Phi + Theta, Y + x * Theta))
-    ends = (psi.subs(x, 0), w.subs(x, L), psi.subs(x, L), (parse_expression(STIFFNESS) * sp.diff(psi, x)).subs(x, 0))
+    ends = (
+        psi.subs(x, 0),
+        w.subs(x, L),
+        psi.subs(x, L),
+        (parse_expression(STIFFNESS) * sp.diff(psi, x)).subs(x, 0),
+    )
     return [mpmath.mpmathify(number(f)) for f in ends]
 
 

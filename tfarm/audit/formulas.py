@@ -23,12 +23,12 @@ from typing import Any
 
 import sympy as sp
 
-from .rows import DATA
+from tfarm.audit.rows import DATA
 
-Expression = Any  # sympy comes without types
+# sympy comes without types
+Expression = Any
 symbol = sp.Symbol
 symbols: Any = sp.symbols
-OF_TIME = ("theta", "Theta", "V", "K2", "a1")
 JET = re.compile(r"\b(y|phi|theta|Y|Phi|Theta|V|K2|a1)(?:_(x*t*))?(?!\w)(?:\(([0Lts]), ?([0Lts])\))?")
 NAME = re.compile(r"[A-Za-z]\w*")
 LETTERS = {"pm": r"\pm", "lambda_": r"\lambda", **{f"Delta_k{i}": rf"\Delta k_{{{i}}}" for i in (1, 2, 3, 4)}}
@@ -37,10 +37,11 @@ FUNCTIONS = {"sqrt": sp.sqrt, "exp": sp.exp, "oo": sp.oo}
 
 def jet(field: str, x: int = 0, t: int = 0, at: str = "") -> Expression:
     """The derivative of a field, x times by x and t times by t; `at` is "", "(0,t)" or "(L,t)"."""
-    if x and field in OF_TIME:
+    of_time = ("theta", "Theta", "V", "K2", "a1")
+    if x and field in of_time:
         return sp.Integer(0)
     orders = "x" * x + "t" * t
-    return symbol(f"{field}{'_' + orders if orders else ''}{'' if field in OF_TIME else at}")
+    return symbol(f"{field}{'_' + orders if orders else ''}{'' if field in of_time else at}")
 
 
 def jets(f: Expression) -> list[tuple[Expression, str, int, int, str]]:
@@ -79,7 +80,8 @@ def _read(text: str, integral: Any, **how: Any) -> Expression:
         return name
 
     code = JET.sub(stand_in, text).replace("^", "**")
-    code = re.sub(r"\blambda\b", "lambda_", code)  # a keyword of Python
+    # a keyword of Python
+    code = re.sub(r"\blambda\b", "lambda_", code)
     names |= {name: symbol(name) for name in NAME.findall(code) if name not in names}
     return sp.parse_expr(code, local_dict=names, **how)
 
@@ -95,18 +97,23 @@ def tex(text: str) -> str:
         read = _read(part, lambda f: sp.Integral(f, (x, 0, L)), evaluate=False)
         heads = {s: s.name.partition("(") for s in read.free_symbols}
         names = {
-            s: LETTERS.get(s.name, sp.latex(symbol(name)) + place + end) for s, (name, place, end) in heads.items()
+            s: LETTERS.get(s.name, sp.latex(symbol(name)) + place + end)
+            for s, (name, place, end) in heads.items()
         }
         return str(sp.latex(read, order="none", symbol_names=names))
 
     parts = re.split(r"( = | < |; )", text)
-    found = "".join(part.replace("; ", r",\quad ") if n % 2 else written(part) for n, part in enumerate(parts) if part)
+    found = "".join(
+        part.replace("; ", r",\quad ") if n % 2 else written(part) for n, part in enumerate(parts) if part
+    )
     return re.sub(r"\b1 (\\cdot )?(?=\\frac\{1\})", "", found.replace(r"+ \pm", r"\pm"))
 
 
 def matrix_of_text(text: str) -> Expression:
     """The matrix of a text such as |a11 a12 / a21 a22|."""
-    return sp.Matrix([[parse_expression(entry) for entry in row.split()] for row in text.strip("|").split(" / ")])
+    return sp.Matrix(
+        [[parse_expression(entry) for entry in row.split()] for row in text.strip("|").split(" / ")]
+    )
 
 
 def clauses(text: str) -> list[str]:
@@ -137,13 +144,16 @@ def remainder(*expressions: Expression) -> str:
     return text if len(text) <= 160 else f"{text[:150]} ... ({len(text)} characters)"
 
 
-AT_TIP = "(L,t)"  # places of a jet
+# places of a jet
+AT_TIP = "(L,t)"
 AT_ROOT = "(0,t)"
 
 
 def d_dx(f: Expression) -> Expression:
     """Total derivative by the running x; values at the ends do not move."""
-    return sp.diff(f, x) + sum(sp.diff(f, s) * jet(field, i + 1, j) for s, field, i, j, at in jets(f) if not at)
+    return sp.diff(f, x) + sum(
+        sp.diff(f, s) * jet(field, i + 1, j) for s, field, i, j, at in jets(f) if not at
+    )
 
 
 def d_dt(f: Expression) -> Expression:
@@ -180,11 +190,13 @@ def balance_residual(f: Expression) -> str:
     inside, outside = integral_parts(f)
     at_length = at_running_point(outside)
     fields = [each for each in jets(at_length) if each[4] in ("", AT_ROOT) and each[1] in ("y", "phi")]
-    at_root = {s: jet(field, i, j, AT_ROOT) if i else sp.Integer(0) for s, field, i, j, _ in fields}  # (6), (7)
+    # (6), (7)
+    at_root = {s: jet(field, i, j, AT_ROOT) if i else sp.Integer(0) for s, field, i, j, _ in fields}
     return remainder(inside + d_dx(at_length), at_length.subs(at_root).subs(x, 0))
 
 
-KG, METRE, SECOND = sp.symbols("kg m s", positive=True)  # so that the root of a square is the unit itself
+# so that the root of a square is the unit itself
+KG, METRE, SECOND = sp.symbols("kg m s", positive=True)
 UNITS = {"kg": KG, "m": METRE, "s": SECOND, "N": KG * METRE / SECOND**2, "Pa": KG / (METRE * SECOND**2)}
 
 
@@ -218,7 +230,8 @@ def dimension(f: Expression, units: dict[str, Expression]) -> Expression:
         return sp.Mul(*parts)
     if f.is_Pow:
         return parts[0] ** f.exp
-    if f.func.__name__ == "integral":  # over x
+    # over x
+    if f.func.__name__ == "integral":
         return parts[0] * METRE
     kinds = {*parts, sp.Integer(1)} if isinstance(f, sp.exp) else set(parts)
     if len(kinds) > 1:

@@ -9,13 +9,12 @@ from pathlib import Path
 from numba import config
 from pydantic import TypeAdapter
 
+from tfarm.audit.rows import TEXTS, AuditRow
 from tfarm.errors import ParameterError
 from tfarm.files import write_file
 
-from .rows import TEXTS, AuditRow
-
-PACKAGES = ("mpmath", "numba", "numpy", "python-flint", "scipy", "sympy")  # that compute a verdict or a number of it
-FOLDER = Path(config.CACHE_DIR or Path(__file__).parent / "__pycache__")  # as compiled kernels have it
+# as compiled kernels have it
+FOLDER = Path(config.CACHE_DIR or Path(__file__).parent / "__pycache__")
 ROWS = TypeAdapter(tuple[AuditRow, ...])
 
 
@@ -31,9 +30,11 @@ def kept_audit(folder: Path = FOLDER) -> tuple[AuditRow, ...]:
         found = ROWS.validate_json(file.read_bytes(), strict=True)
     except (OSError, ValueError):
         found = ()
-    if [(row.equation, row.printed) for row in found] == [(name, each["printed"]) for name, each in TEXTS.items()]:
+    if [(row.equation, row.printed) for row in found] == [
+        (name, each["printed"]) for name, each in TEXTS.items()
+    ]:
         return found
-    from .paper import audit
+    from tfarm.audit.paper import audit
 
     found = audit()
     with suppress(OSError, ParameterError):
@@ -44,8 +45,10 @@ def kept_audit(folder: Path = FOLDER) -> tuple[AuditRow, ...]:
 
 def source_hash() -> str:
     """Return the hash of all that an audit depends on: sources and tables of tfarm, and versions of what they use."""
+    # that compute a verdict or a number of it
+    packages = ("mpmath", "numba", "numpy", "python-flint", "scipy", "sympy")
     root = Path(__file__).parents[1]
-    versions = [platform.python_version(), *map(version, PACKAGES)]
+    versions = [platform.python_version(), *map(version, packages)]
     digest = hashlib.sha256(" ".join(versions).encode())
     for source in sorted(each for kind in ("py", "toml") for each in root.rglob(f"*.{kind}")):
         digest.update(source.relative_to(root).as_posix().encode() + source.read_bytes())

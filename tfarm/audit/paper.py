@@ -16,15 +16,9 @@ import sympy as sp
 from scipy.linalg import expm
 
 from tfarm.arm import HubFeedback, load
-from tfarm.errors import CertificationError
-from tfarm.loop.poles import closed_loop_poles
-from tfarm.reduced import modal_model
-from tfarm.schema import Quantity
-from tfarm.spectrum import modes
-
-from . import equations
-from .equations import accelerations, equation
-from .formulas import (
+from tfarm.audit import equations
+from tfarm.audit.equations import accelerations, equation
+from tfarm.audit.formulas import (
     AT_ROOT,
     AT_TIP,
     PAPER_UNITS,
@@ -47,14 +41,18 @@ from .formulas import (
     tex,
     unit_dimension,
 )
-from .rows import TEXTS, AuditRow, formula_of, is_zero
+from tfarm.audit.rows import TEXTS, AuditRow, formula_of, is_zero
+from tfarm.errors import CertificationError
+from tfarm.loop.poles import closed_loop_poles
+from tfarm.reduced import modal_model
+from tfarm.schema import Quantity
+from tfarm.spectrum import modes
 
 # ------------------------------------------------------------ (15)-(20) and the feedback
-K1 = 0.3  # N m s/rad
-MODES = 8  # of the arm whose gain is switched
-
-
-SWITCHED = ((0.1, 27.0), (0.6, 25.0))  # K2, and for how long [ms]
+# N m s/rad
+K1 = 0.3
+# of the arm whose gain is switched
+MODES = 8
 
 
 def growth_per_period(switched: tuple[tuple[float, float], ...]) -> float:
@@ -75,14 +73,16 @@ def growth() -> dict[str, Any]:
 
 def pumping() -> dict[str, Any]:
     """A gain that varies between two stable values and drives the arm unstable."""
-    low, high = SWITCHED
-    constant = max(growth_per_period((each,)) for each in SWITCHED)
+    # K2, and for how long [ms]
+    switched = ((0.1, 27.0), (0.6, 25.0))
+    low, high = switched
+    constant = max(growth_per_period((each,)) for each in switched)
     return {
         "K1": K1,
         "modes": MODES,
         "low": low,
         "high": high,
-        "grows": growth_per_period(SWITCHED),
+        "grows": growth_per_period(switched),
         "constant": constant,
     }
 
@@ -98,10 +98,14 @@ def rate(energy_of: Expression, damping: Expression = 0) -> Expression:
     """dV/dt with the accelerations of (1)-(5); with damping, E phi_x becomes E (phi_x + C phi_xt) in them."""
     E = symbol("E")
     arm, tip, hub = (
-        {s: sp.expand(f).subs({E * p: E * (p + damping * jet(of, i, j + 1, at)) for p, of, i, j, at in jets(f) if i})
-         for s, f in accelerations(place).items()}
+        {
+            s: sp.expand(f).subs(
+                {E * p: E * (p + damping * jet(of, i, j + 1, at)) for p, of, i, j, at in jets(f) if i}
+            )
+            for s, f in accelerations(place).items()
+        }
         for place in ("", AT_TIP, AT_ROOT)
-    )  # fmt: skip
+    )
     inside, outside = integral_parts(d_dt(energy_of))
     outside = sp.expand(sp.expand(outside.subs(tip)).subs(hub))
     return sp.Function("integral")(sp.expand(inside.subs(arm))) + outside
@@ -148,7 +152,8 @@ def proven_gains(law: Expression) -> dict[str, Expression]:
     M = symbol("M(0)")
     slope = parse_expression("phi_x(0,t)")
     power = sp.expand(read_claim(formula_of("(18)"))[0].subs(u, law)).subs(slope, M / parse_expression("E*I"))
-    weight = sp.solve(power.coeff(M), a1)[0] / a2  # a1/a2, which must be positive
+    # a1/a2, which must be positive
+    weight = sp.solve(power.coeff(M), a1)[0] / a2
     damping = -sp.expand(power.subs(M, 0)) / (a2 * theta_t**2)
     positive = {"K1": damping, "K2": weight}
     return {gain: sp.solveset(sp.simplify(f) > 0, symbol(gain), sp.S.Reals) for gain, f in positive.items()}
@@ -194,8 +199,6 @@ def is_varied_decay(text: str) -> str:
 
 
 # ------------------------------------------------------------ Table 1, (21)-(23), section 5
-ALUMINIUM_DENSITIES = (2550.0, 2900.0)  # kg/m^3: alloys from aluminium-lithium to those rich in copper and zinc
-PRINTED_E = 6.8944e10  # Pa, as printed
 PAPER = (
     "Self-Tuning Vibration Control of a Rotational Flexible Timoshenko Arm Using Neural Networks, "
     "Advances in Acoustics and Vibration, 2012, article 852780"
@@ -211,10 +214,13 @@ def quantity(clause: str) -> tuple[str, float, Expression]:
 
 def is_aluminium(text: str) -> str:
     """rho: the relative distance from what aluminium alloys weigh, the material of E and G."""
+    # ------------------------------------------------------------ Table 1, (21)-(23), section 5
+    # kg/m^3: alloys from aluminium-lithium to those rich in copper and zinc
+    aluminium_densities = (2550.0, 2900.0)
     name, value, dimension = quantity(text)
     if dimension != PAPER_UNITS[name]:
         return f"{name} in {base_units_text(dimension)}"
-    low, high = ALUMINIUM_DENSITIES
+    low, high = aluminium_densities
     distance = max(1 - value / low, value / high - 1, 0.0)
     return f"{distance:.4f}" if distance else "0"
 
@@ -230,7 +236,9 @@ def is_given(name: str, text: str) -> str:
     """Whether a parameter that (2), (3) and the a_ij need has a value of the right dimension."""
     for clause in (clause for clause in clauses(text) if clause.startswith(f"{name} = ")):
         _, value, dimension = quantity(clause)
-        return "0" if value > 0 and dimension == PAPER_UNITS[name] else f"{name} in {base_units_text(dimension)}"
+        return (
+            "0" if value > 0 and dimension == PAPER_UNITS[name] else f"{name} in {base_units_text(dimension)}"
+        )
     return f"{name} has no value"
 
 
@@ -244,18 +252,24 @@ def is_section(text: str) -> str:
     width, depth = (quantity(f"side = {side}")[1] for side in sides)
     # the printed area is 6.0e-4 m^2
     off = max(abs(width * depth / 6.0e-4 - 1), abs(width * depth**3 / 12 / value - 1))
-    return f"{off:.2g}" if off > 1e-12 else "0"  # doubles read from decimals
+    # doubles read from decimals
+    return f"{off:.2g}" if off > 1e-12 else "0"
 
 
 def density() -> dict[str, Any]:
     """What the density printed would mean."""
-    printed, used = (modes(load(name), 3).natural_frequency[1:] for name in ("sasaki2012-as-printed", "sasaki2012"))
-    speeds = [math.sqrt(PRINTED_E / rho) / 1e3 for rho in (2.7667, 2766.7)]
+    # Pa, as printed
+    printed_e = 6.8944e10
+    printed, used = (
+        modes(load(name), 3).natural_frequency[1:] for name in ("sasaki2012-as-printed", "sasaki2012")
+    )
+    speeds = [math.sqrt(printed_e / rho) / 1e3 for rho in (2.7667, 2766.7)]
     # the printed G is 2.6517e10 Pa
-    return {"poisson": PRINTED_E / (2 * 2.6517e10) - 1, "speeds": speeds, "ratios": printed / used}
+    return {"poisson": printed_e / (2 * 2.6517e10) - 1, "speeds": speeds, "ratios": printed / used}
 
 
-INPUT_NEURONS = 6  # neurons, section 5
+# neurons, section 5
+INPUT_NEURONS = 6
 
 
 def descends(increment: str, update: str) -> str:
@@ -279,7 +293,8 @@ def is_cost(text: str) -> str:
     moment = {parse_expression("phi_x(0,t)"): x / parse_expression("E*I"), symbol("K2"): symbol("K")}
     torque = sides(CONTROL_LAW)[u].subs(moment)
     given = sides(text)
-    signal = given[e].subs(u, given.get(u, torque))  # "control input": the torque, unless the text defines it
+    # "control input": the torque, unless the text defines it
+    signal = given[e].subs(u, given.get(u, torque))
     curvature = sp.hessian(given[symbol("E")], (x, e)) - sp.diag(a, b)
     return remainder(signal - torque, *curvature)
 
@@ -292,7 +307,9 @@ def are_gain_units(text: str) -> str:
         for name in (s.name for s in sides(text)[left].coeff(factor).free_symbols if s.name.startswith("K")):
             needs.setdefault(name, {PAPER_UNITS.get(name, of)}).add(of)
     clashes = [
-        f"{name}: {' and '.join(sorted(map(base_units_text, two)))}" for name, two in needs.items() if len(two) > 1
+        f"{name}: {' and '.join(sorted(map(base_units_text, two)))}"
+        for name, two in needs.items()
+        if len(two) > 1
     ]
     return "; ".join(clashes) or "0"
 
@@ -345,9 +362,12 @@ class Claim:
     printed: str
     check: Callable[[str], str]
     evidence: str
-    corrected: str = ""  # empty: the print is right
-    doubt: str = ""  # what cannot be decided
-    measured: Callable[[], dict[str, Any]] = dict  # numbers that the evidence has
+    # empty: the print is right
+    corrected: str = ""
+    # what cannot be decided
+    doubt: str = ""
+    # numbers that the evidence has
+    measured: Callable[[], dict[str, Any]] = dict
 
     def row(self) -> AuditRow:
         """Run the check on both texts.  Raises CertificationError where the corrected one leaves a residual."""
@@ -371,7 +391,9 @@ class Claim:
 
 def claims() -> tuple[Claim, ...]:
     """Every claim, in the order of the paper."""
-    return tuple(Claim(**texts, check=CHECKS[name], measured=MEASURED.get(name, dict)) for name, texts in TEXTS.items())
+    return tuple(
+        Claim(**texts, check=CHECKS[name], measured=MEASURED.get(name, dict)) for name, texts in TEXTS.items()
+    )
 
 
 @cache
@@ -388,4 +410,6 @@ class Audit:
     """The paper, equation by equation."""
 
     paper: Annotated[str, Quantity("paper", help="the article whose equations are checked")]
-    rows: Annotated[tuple[AuditRow, ...], Quantity("equations", help="verdict and residuals, a row an equation")]
+    rows: Annotated[
+        tuple[AuditRow, ...], Quantity("equations", help="verdict and residuals, a row an equation")
+    ]

@@ -84,15 +84,26 @@ class PublishedRow:
 
     source: Annotated[str, Quantity("source", help="short name of the publication")]
     case: Annotated[str, Quantity("case", help="boundary conditions and payload of one column of the table")]
-    quantity: Annotated[str, Quantity("quantity", help="quantity that is printed, with its unit or normalisation")]
+    quantity: Annotated[
+        str, Quantity("quantity", help="quantity that is printed, with its unit or normalisation")
+    ]
     mode: Annotated[int, Quantity("mode", help="number of the mode, from 1")]
     agrees: Annotated[
-        bool, Quantity("agrees to the last printed digit", help="whether the exact value rounds to the printed digits")
+        bool,
+        Quantity(
+            "agrees to the last printed digit", help="whether the exact value rounds to the printed digits"
+        ),
     ]
     printed: Annotated[str, Quantity("printed", help="number as printed, with its zeros")]
-    ours: Annotated[float, Quantity("exact", digits=10, help="value by the exact solution in the same quantity")]
-    difference: Annotated[float, Quantity("relative difference", digits=2, help="exact over printed, less one")]
-    why: Annotated[str, Quantity(help="reason of a difference beyond the printed digits; empty where there is none")]
+    ours: Annotated[
+        float, Quantity("exact", digits=10, help="value by the exact solution in the same quantity")
+    ]
+    difference: Annotated[
+        float, Quantity("relative difference", digits=2, help="exact over printed, less one")
+    ]
+    why: Annotated[
+        str, Quantity(help="reason of a difference beyond the printed digits; empty where there is none")
+    ]
 
 
 class PublishedDifference(NamedTuple):
@@ -103,7 +114,9 @@ class PublishedDifference(NamedTuple):
     modes: Annotated[str, Quantity("modes", help="numbers of the modes that differ")]
     largest: Annotated[
         float,
-        Quantity("largest difference", digits=2, help="exact over printed, less one, of the mode that differs most"),
+        Quantity(
+            "largest difference", digits=2, help="exact over printed, less one, of the mode that differs most"
+        ),
     ]
     why: Annotated[str, Quantity("reason", help="cause of the difference, computed anew in the tests")]
 
@@ -140,7 +153,9 @@ def case_rows(key: str, case: PrintedColumn) -> list[PublishedRow]:
             agrees=agrees(ours, printed),
             why=case.why.get(mode, ""),
         )
-        for mode, (printed, ours) in enumerate(zip(case.printed, exact_numbers(case).tolist(), strict=True), start=1)
+        for mode, (printed, ours) in enumerate(
+            zip(case.printed, exact_numbers(case).tolist(), strict=True), start=1
+        )
     ]
 
 
@@ -171,7 +186,9 @@ class Validation:
     rows: Annotated[
         tuple[PublishedRow, ...], Quantity("published numbers", help="printed and exact value of each number")
     ]
-    sources: Annotated[tuple[Source, ...], Quantity("sources", help="publications that the numbers are from")] = ALL
+    sources: Annotated[
+        tuple[Source, ...], Quantity("sources", help="publications that the numbers are from")
+    ] = ALL
 
     @property
     def differences(
@@ -185,7 +202,11 @@ class Validation:
         groups = ((key, list(of)) for key, of in groupby(rows, attrgetter("source", "case", "why")))
         return [
             PublishedDifference(
-                source, case, ", ".join(str(row.mode) for row in of), max((r.difference for r in of), key=abs), why
+                source,
+                case,
+                ", ".join(str(row.mode) for row in of),
+                max((r.difference for r in of), key=abs),
+                why,
             )
             for (source, case, why), of in groups
         ]
@@ -194,7 +215,10 @@ class Validation:
     def agree(
         self,
     ) -> Annotated[
-        int, Quantity("agree to the last printed digit", help="count of printed numbers that the exact value rounds to")
+        int,
+        Quantity(
+            "agree to the last printed digit", help="count of printed numbers that the exact value rounds to"
+        ),
     ]:
         """How many numbers agree."""
         return sum(row.agrees for row in self.rows)
@@ -205,7 +229,10 @@ class Validation:
     ) -> Annotated[
         int,
         Quantity(
-            "differ for the reason given", "", 6, "count of printed numbers with another last digit and a known cause"
+            "differ for the reason given",
+            "",
+            6,
+            "count of printed numbers with another last digit and a known cause",
         ),
     ]:
         """How many do not."""

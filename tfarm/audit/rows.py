@@ -17,7 +17,8 @@ from typing import Annotated
 from tfarm.schema import Quantity
 
 DATA = tomllib.loads((files("tfarm.audit") / "claims.toml").read_text("utf-8"))
-TEXTS: dict[str, dict[str, str]] = {each["equation"]: each for each in DATA["claim"]}  # in the order of the paper
+# in the order of the paper
+TEXTS: dict[str, dict[str, str]] = {each["equation"]: each for each in DATA["claim"]}
 
 
 def formula_of(equation: str) -> str:
@@ -25,7 +26,8 @@ def formula_of(equation: str) -> str:
     return TEXTS[equation].get("corrected") or TEXTS[equation]["printed"]
 
 
-RESIDUAL_NOISE = 1e-25  # relative: numbers are compared at 50 digits
+# relative: numbers are compared at 50 digits
+RESIDUAL_NOISE = 1e-25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +39,9 @@ class AuditRow:
         str, Quantity("verdict", help="ok, corrected, or undecided where the paper leaves several readings")
     ]
     printed: Annotated[str, Quantity(help="formula as the paper prints it")]
-    corrected: Annotated[str, Quantity(help="formula that passes the check; the printed one where that is right")]
+    corrected: Annotated[
+        str, Quantity(help="formula that passes the check; the printed one where that is right")
+    ]
     evidence: Annotated[str, Quantity(help="check that separates the two formulas, and its result")]
     residual_printed: Annotated[
         str, Quantity("residual as printed", help="remainder of the printed formula in the check; 0 is right")

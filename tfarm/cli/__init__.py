@@ -15,10 +15,12 @@ def main(arguments: list[str] | None = None) -> None:
     has one thread, unless the user chose a number: on matrices of a hundred rows more only wait for each other.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    gc.set_threshold(100_000, 20, 20)  # the usual 700 new objects are reached hundreds of times by imports alone
+    # the usual 700 new objects are reached hundreds of times by imports alone
+    gc.set_threshold(100_000, 20, 20)
     if arguments is None:
         stop_on_signals()
-        atexit.register(gc.freeze)  # a last look through all that was loaded takes half a second, and frees nothing
+        # a last look through all that was loaded takes half a second, and frees nothing
+        atexit.register(gc.freeze)
     try:
         from tfarm.cli.running import run
 

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from tfarm.arm.chain import Chain
 
 app = typer.Typer(name="tfarm", rich_markup_mode="rich", pretty_exceptions_enable=False)
-PROGRESS_AFTER = 2.0  # seconds to the first line of progress
+# seconds to the first line of progress
+PROGRESS_AFTER = 2.0
 
 
 def print_version(wanted: bool) -> None:
@@ -41,7 +42,8 @@ def print_version(wanted: bool) -> None:
 @app.callback(options_metavar="[--version] [--help]")
 def tfarm_options(
     version: Annotated[
-        bool, typer.Option("--version", is_eager=True, callback=print_version, help="print the version, and exit")
+        bool,
+        typer.Option("--version", is_eager=True, callback=print_version, help="print the version, and exit"),
     ] = False,
 ) -> None:
     """Exact frequency-domain analysis of a rotating flexible Timoshenko arm."""
@@ -65,7 +67,9 @@ def read_arms(names: Any) -> list[ArmFile]:
     return [load_tables(name) for name in names or ()]
 
 
-def numbers(form: str, count: int = 0, kind: Callable[[str], Any] = float) -> Callable[[str], tuple[Any, ...]]:
+def numbers(
+    form: str, count: int = 0, kind: Callable[[str], Any] = float
+) -> Callable[[str], tuple[Any, ...]]:
     """Return the parser of numbers that commas separate, `count` of them or any; `form` is that of the option."""
 
     def parse(text: str) -> tuple[Any, ...]:
@@ -117,29 +121,51 @@ ArmName = Annotated[  # in a command the tables of that file, read and parsed on
         show_default=False,
     ),
 ]
-TheoryName = Annotated[Theory | None, typer.Option("--theory", help="beam theory; by default that of the arm's file")]
+TheoryName = Annotated[
+    Theory | None, typer.Option("--theory", help="beam theory; by default that of the arm's file")
+]
 Png = Annotated[
     Path | None,
-    typer.Option("--figure", "--png", metavar="FILE", callback=check_figure,
-                 help="draw the picture into this file: .png, or .pdf or .svg at the width of a paper's column"),
-]  # fmt: skip
-File = Annotated[Path | None, typer.Option(metavar="FILE")]  # to be written
+    typer.Option(
+        "--figure",
+        "--png",
+        metavar="FILE",
+        callback=check_figure,
+        help="draw the picture into this file: .png, or .pdf or .svg at the width of a paper's column",
+    ),
+]
+# to be written
+File = Annotated[Path | None, typer.Option(metavar="FILE")]
 InputName = Annotated[
     str | None,
-    typer.Option("--input", help="hub_torque, motor_voltage, motor_current, hub_angle, force@X or moment_pair@X1,X2"),
+    typer.Option(
+        "--input", help="hub_torque, motor_voltage, motor_current, hub_angle, force@X or moment_pair@X1,X2"
+    ),
 ]
 ModeCount = Annotated[int, typer.Option("--modes", min=1, max=30, help="flexible modes")]
 LawFile = Annotated[
     Path | None,
-    typer.Option("--law", metavar="FILE", exists=True, help="TOML file with a [law]; by default that of the arm's file",
-                 rich_help_panel=CONTROLLER),
-]  # fmt: skip
+    typer.Option(
+        "--law",
+        metavar="FILE",
+        exists=True,
+        help="TOML file with a [law]; by default that of the arm's file",
+        rich_help_panel=CONTROLLER,
+    ),
+]
 LawFiles = Annotated[
     list[Path] | None,
-    typer.Option("--law", metavar="FILE", exists=True, help="TOML file with a [law]; may be repeated",
-                 rich_help_panel=CONTROLLER),
-]  # fmt: skip
-AngleGain = Annotated[float, typer.Option(f"--{ANGLE_GAIN}", help="hub angle gain", rich_help_panel=CONTROLLER)]
+    typer.Option(
+        "--law",
+        metavar="FILE",
+        exists=True,
+        help="TOML file with a [law]; may be repeated",
+        rich_help_panel=CONTROLLER,
+    ),
+]
+AngleGain = Annotated[
+    float, typer.Option(f"--{ANGLE_GAIN}", help="hub angle gain", rich_help_panel=CONTROLLER)
+]
 
 
 def given_gains(
@@ -202,7 +228,9 @@ def help_of(function: Callable[..., Any]) -> tuple[str, dict[str, str]]:
     words, _, lines = (getdoc(function) or "").partition("\n\nOptions:\n")
     # a paragraph is one line: where it is broken, the width of the terminal decides
     paragraphs = [" ".join(each.split()) for each in words.split("\n\n")]
-    return "\n\n".join(paragraphs), dict(line.split(": ", 1) for line in re.split(r"\n(?=\w)", lines) if lines)
+    return "\n\n".join(paragraphs), dict(
+        line.split(": ", 1) for line in re.split(r"\n(?=\w)", lines) if lines
+    )
 
 
 def keyword_only(function: Callable[..., Any]) -> Iterator[Parameter]:
@@ -235,7 +263,9 @@ def keywords_of(function: Callable[..., Any], options: Mapping[str, Any]) -> dic
 
 def _with_help(option: Parameter, text: str) -> Parameter:
     """Return the parameter of a command with that help; a plain one becomes the option --NAME."""
-    kind, *infos = get_args(option.annotation) if get_origin(option.annotation) is Annotated else [option.annotation]
+    kind, *infos = (
+        get_args(option.annotation) if get_origin(option.annotation) is Annotated else [option.annotation]
+    )
     info = copy(infos[0]) if infos else typer.Option(f"--{option.name.replace('_', '-')}")
     info.help = " ".join(text.split()) or info.help
     return option.replace(annotation=Annotated[kind, info])
@@ -275,14 +305,20 @@ def load_law(
 
     if other is not None:
         file = load_tables(other)
-        refuse({f"--{gain}": value for gain, value in gains.items()}, f"the law is that of {file.name}; leave this out")
+        refuse(
+            {f"--{gain}": value for gain, value in gains.items()},
+            f"the law is that of {file.name}; leave this out",
+        )
     own = None if gains else read(file)
     if own is not None:
         return own, {}
     require(other is None, "--law", file.name, "has no table [law]")
     missing = [gain for gain in PLANE if gain not in gains]
     words = default_words(arm, missing) if missing else None
-    return replace(tfarm.default_gains(arm), **gains), {"default_gains": missing, "default_gains_in_words": words}
+    return replace(tfarm.default_gains(arm), **gains), {
+        "default_gains": missing,
+        "default_gains_in_words": words,
+    }
 
 
 def load_loop(
@@ -308,11 +344,15 @@ def load_chain(
     *,
     period: Annotated[
         float | None,
-        typer.Option("--period", help="sampling period [s]; by default the file's, or 0.01", rich_help_panel=SAMPLING),
+        typer.Option(
+            "--period", help="sampling period [s]; by default the file's, or 0.01", rich_help_panel=SAMPLING
+        ),
     ] = None,
     delay_samples: Annotated[
         float | None,
-        typer.Option("--delay-samples", help="computational delay in samples, any fraction", rich_help_panel=SAMPLING),
+        typer.Option(
+            "--delay-samples", help="computational delay in samples, any fraction", rich_help_panel=SAMPLING
+        ),
     ] = None,
     dsp: Annotated[
         str | None,
@@ -337,7 +377,8 @@ def outputs_on(
     *,
     x: Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")] = None,
     side: Annotated[
-        str | None, typer.Option("--side", help="outer (default) or inner side of a joint, for outputs along the arm")
+        str | None,
+        typer.Option("--side", help="outer (default) or inner side of a joint, for outputs along the arm"),
     ] = None,
 ) -> tuple[list[Any], float | None]:
     """Return the outputs of these names, on one side of a joint where that is given, and the place of those along."""
@@ -385,7 +426,9 @@ def emit_record(
         show_table(summary.table)
         show_text("\n".join(summary.notes))
         print()
-    words = f"by default {defaults['default_gains_in_words']}" if defaults and defaults["default_gains"] else ""
+    words = (
+        f"by default {defaults['default_gains_in_words']}" if defaults and defaults["default_gains"] else ""
+    )
     show(record, rows, words)
 
 
@@ -397,7 +440,9 @@ def emit(
     picture: str | None = None,
     *,
     show: Any = emit_record,
-    csv: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="write the table to this file")] = None,
+    csv: Annotated[
+        Path | None, typer.Option("--csv", metavar="FILE", help="write the table to this file")
+    ] = None,
     png: Png = None,
 ) -> None:
     """Write the curves or rows of a record to CSV and its `picture` to a file, then print it.
@@ -407,7 +452,8 @@ def emit(
     if csv is not None:
         write_file(csv, as_csv(curve_table(record), units=True).encode(), key="--csv")
     if png is not None:
-        from tfarm import plots  # every picture is registered once they are loaded
+        # every picture is registered once they are loaded
+        from tfarm import plots
 
         draw = getattr(plots, picture).figure if picture else plots.style.FIGURES[type(record)]
         plots.style.save_picture(draw, record, png)
@@ -430,7 +476,8 @@ def given(options: Any) -> bool:
     return any(value is not None for value in options.keywords.values())
 
 
-_state = ["running"]  # of the command, for the lines of progress
+# of the command, for the lines of progress
+_state = ["running"]
 
 
 def advance(done: int, total: int, text: str) -> None:
@@ -447,7 +494,8 @@ def progress() -> Iterator[Callable[[int, int, str], None]]:
         pause = PROGRESS_AFTER
         while not over.wait(pause):
             pause = 4.0
-            if _state[0]:  # none between a question and its answer
+            # none between a question and its answer
+            if _state[0]:
                 print_line(f"{_state[0]} ({time.monotonic() - began:.0f} s)")
 
     Thread(target=speak, daemon=True).start()

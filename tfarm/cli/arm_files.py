@@ -16,7 +16,6 @@ from tfarm.errors import MISSING, ParameterError, must_be_known, require
 from tfarm.files import write_file
 from tfarm.schema import Quantity
 
-SECTIONS = "rectangle (--width, --depth), round (--diameter) or tube (--outer-diameter, --inner-diameter)"
 Size = Annotated[float | None, typer.Option(rich_help_panel="Section")]
 
 
@@ -27,8 +26,11 @@ def entered(option: str, value: Any, text: str, kind: type = float, usual: Any =
     """
     if value is not None:
         return value
-    require(sys.stdin and sys.stdin.isatty(), option, MISSING, f"give the {text}; on a terminal tfarm asks for it")
-    advance(0, 0, "")  # no lines of progress between question and answer
+    require(
+        sys.stdin and sys.stdin.isatty(), option, MISSING, f"give the {text}; on a terminal tfarm asks for it"
+    )
+    # no lines of progress between question and answer
+    advance(0, 0, "")
     return typer.prompt(text, type=kind, default=usual, err=True)
 
 
@@ -47,9 +49,13 @@ def link_table(*, material: str | None = None, length: float | None = None) -> d
 
 
 def section_table(
-    *, width: Size = None, depth: Size = None, diameter: Size = None, outer_diameter: Size = None,
+    *,
+    width: Size = None,
+    depth: Size = None,
+    diameter: Size = None,
+    outer_diameter: Size = None,
     inner_diameter: Size = None,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Return the table of a section, whose shape follows from its sizes.
 
     Options:
@@ -59,19 +65,27 @@ def section_table(
     outer_diameter: of a round tube [m]
     inner_diameter: of a round tube [m]
     """
+    sections = "rectangle (--width, --depth), round (--diameter) or tube (--outer-diameter, --inner-diameter)"
     from tfarm.arm.schema import file_key
 
-    sizes = {"width": width, "depth": depth, "diameter": diameter, "outer_diameter": outer_diameter,
-             "inner_diameter": inner_diameter}  # fmt: skip
+    sizes = {
+        "width": width,
+        "depth": depth,
+        "diameter": diameter,
+        "outer_diameter": outer_diameter,
+        "inner_diameter": inner_diameter,
+    }
     options = {name: f"--{name.replace('_', '-')}" for name in sizes}
     given = [name for name, size in sizes.items() if size is not None]
     last = (given or ["width"])[-1]
     shapes = [shape for shape, of in SHAPES.items() if set(given) <= set(of.dimensions)]
-    require(shapes, options[last], sizes[last], f"give the sizes of one section: {SECTIONS}")
-    shape = shapes[0] if given else entered(options[last], None, f"section: {SECTIONS}", str, "rectangle")
+    require(shapes, options[last], sizes[last], f"give the sizes of one section: {sections}")
+    shape = shapes[0] if given else entered(options[last], None, f"section: {sections}", str, "rectangle")
     must_be_known("section", shape, SHAPES)
     return {"shape": shape} | {
-        name: entered(options[name], sizes[name], "{0.label} ({0.help}) [m]".format(file_key(f"link.section.{name}")))
+        name: entered(
+            options[name], sizes[name], "{0.label} ({0.help}) [m]".format(file_key(f"link.section.{name}"))
+        )
         for name in SHAPES[shape].dimensions
     }
 
@@ -91,7 +105,9 @@ class Preset:
             key="damping",
         ),
     ]
-    hub_inertia: Annotated[float, Quantity("hub inertia", "kg m^2", help="about the axis of rotation, without a motor")]
+    hub_inertia: Annotated[
+        float, Quantity("hub inertia", "kg m^2", help="about the axis of rotation, without a motor")
+    ]
     payload_mass: Annotated[float, Quantity("payload mass", "kg", help="at the tip")]
     payload_inertia: Annotated[float, Quantity("payload inertia", "kg m^2", help="about the tip")]
     assumptions: Annotated[
@@ -110,11 +126,14 @@ class Presets:
 def list_presets() -> Presets:
     """Return the arms that come with tfarm."""
     names = [each.name for each in fields(Preset)]
-    return Presets([Preset(*(getattr(arm, name) for name in names)) for arm in map(tfarm.load, tfarm.presets())])
+    return Presets(
+        [Preset(*(getattr(arm, name) for name in names)) for arm in map(tfarm.load, tfarm.presets())]
+    )
 
 
 @add_command(
-    "Arm", epilog="new my-arm.toml --material steel --length 0.8 --width 0.06 --depth 0.004 --hub-inertia 0.05"
+    "Arm",
+    epilog="new my-arm.toml --material steel --length 0.8 --width 0.06 --depth 0.004 --hub-inertia 0.05",
 )
 def new(
     *,
@@ -155,7 +174,9 @@ def new(
         refuse({"FILE": file and str(file)}, "--list writes no file: leave this out")
         show(list_presets())
         return
-    refuse({"--json": show.keywords["json"]}, "a file is written: give --list for the arms that come with tfarm")
+    refuse(
+        {"--json": show.keywords["json"]}, "a file is written: give --list for the arms that come with tfarm"
+    )
     if file is None:
         raise ParameterError(key="FILE", value=MISSING, remedy="give a name that ends with .toml, or --list")
     require(file.suffix == ".toml", "FILE", str(file), "give a name that ends with .toml")
@@ -164,7 +185,9 @@ def new(
     tables = {
         "name": file.stem,
         "link": ({} if damping is None else {"damping": damping}) | link() | {"section": section()},
-        "hub": {"inertia": entered("--hub-inertia", hub_inertia, "inertia of the hub about the axis [kg m^2]")},
+        "hub": {
+            "inertia": entered("--hub-inertia", hub_inertia, "inertia of the hub about the axis [kg m^2]")
+        },
         "payload": {"mass": payload_mass, "inertia": payload_inertia},
         **({} if period is None else {"sampling": {"period": period}}),
     }
@@ -175,7 +198,9 @@ def new(
 @add_command("Arm", epilog="check my-arm.toml --figure my-arm.png")
 def check(
     *,
-    arm: Annotated[str, typer.Argument(metavar="ARM", help="preset or TOML file", autocompletion=preset_names)],
+    arm: Annotated[
+        str, typer.Argument(metavar="ARM", help="preset or TOML file", autocompletion=preset_names)
+    ],
     theory: TheoryName = None,
     png: Png = None,
     show: Any = emit_record,

@@ -35,7 +35,10 @@ from tfarm.errors import require
 command = partial(add_command, "Arm")
 measuring_command = partial(add_command, "Measure")
 RecordName = Annotated[
-    Path, typer.Argument(metavar="RECORD", exists=True, help="CSV or .mat file: t [s] and signals", show_default=False)
+    Path,
+    typer.Argument(
+        metavar="RECORD", exists=True, help="CSV or .mat file: t [s] and signals", show_default=False
+    ),
 ]
 pair = named(numbers("KEY=NUMBER,NUMBER", 2))
 OWN_TABLE = "--compare prints a table of its own: ask for one of them"
@@ -47,7 +50,9 @@ def check_method(
     method: Annotated[
         str, typer.Option("--method", help="closed-form, balls, or appendix (the paper's determinant)")
     ] = "closed-form",
-    compare: Annotated[bool, typer.Option("--compare", help="all three methods and their differences")] = False,
+    compare: Annotated[
+        bool, typer.Option("--compare", help="all three methods and their differences")
+    ] = False,
     digits: Annotated[
         int | None, typer.Option("--digits", min=1, max=1000, help="certified digits; texts in JSON above 15")
     ] = None,
@@ -57,7 +62,9 @@ def check_method(
     Raises ParameterError for digits, or too many points, by one of the slow methods.
     """
     if method != "closed-form" or compare:
-        refuse({"--digits": digits}, "they are certified by balls in any case: leave --method and --compare out")
+        refuse(
+            {"--digits": digits}, "they are certified by balls in any case: leave --method and --compare out"
+        )
         remedy = "at most 2000 by balls or the appendix, which take milliseconds for each"
         require(number <= 2000, "points", number, remedy)
     return method, compare, digits
@@ -86,13 +93,16 @@ def modes(
     method, is_compared, digits = how(len(found))
     if is_compared:
         refuse({"--certify": certify}, OWN_TABLE)
-        show(ByMethods(found.arm.name, "natural_frequency", "rad/s", found.index.tolist(), found.by_methods()))
+        show(
+            ByMethods(found.arm.name, "natural_frequency", "rad/s", found.index.tolist(), found.by_methods())
+        )
         return
     listed = listed_modes(found, digits, certify, method)
     show(listed)
     if listed.damped_failure:
         print_line(listed.damped_failure)
-        raise typer.Exit(3)  # as where nothing could be solved
+        # as where nothing could be solved
+        raise typer.Exit(3)
 
 
 @command(epilog="response sasaki2012-lab --from 1 --to 100 --csv root.csv")
@@ -104,10 +114,14 @@ def response(
         Any,
         typer.Option(
             metavar="S,S",
-            parser=numbers("numbers in 1/s such as 0.3+57.1j,10j", kind=lambda text: complex(text.replace("i", "j"))),
+            parser=numbers(
+                "numbers in 1/s such as 0.3+57.1j,10j", kind=lambda text: complex(text.replace("i", "j"))
+            ),
         ),
     ] = None,
-    omega: Annotated[Any, typer.Option(metavar="W,W", parser=numbers("frequencies in rad/s such as 1,10,100"))] = None,
+    omega: Annotated[
+        Any, typer.Option(metavar="W,W", parser=numbers("frequencies in rad/s such as 1,10,100"))
+    ] = None,
     start: Annotated[float, typer.Option("--from")] = 0.1,
     stop: Annotated[float, typer.Option("--to")] = 1000.0,
     points: Annotated[int, typer.Option(min=2, max=1_000_000)] = 500,
@@ -208,7 +222,8 @@ def bode(
 
     of_loop = {**under.keywords["gains"].keywords, "law": under.keywords["law"], **chain.keywords}
     refuse(
-        {f"--{name.replace('_', '-')}": value for name, value in of_loop.items()}, "the loop function: give --loop too"
+        {f"--{name.replace('_', '-')}": value for name, value in of_loop.items()},
+        "the loop function: give --loop too",
     )
     subject = load_arm(arm, under.keywords["theory"], driven)
     (wanted,), x = along(["root_moment" if output is None else output])
@@ -301,10 +316,16 @@ def fit(
     for each in measured:
         overlay.check_unit(subject, each)
     found = tfarm.fit(
-        subject, measured, [key.strip() for key in free.split(",") if key.strip()],
-        rings=[model.mode_of(text) for text in mode or []], profile=not covariance, progress=advance,
-        start={key: value for key, (value,) in start or []}, bounds=dict(bounds or []), priors=dict(prior or []),
-    )  # fmt: skip
+        subject,
+        measured,
+        [key.strip() for key in free.split(",") if key.strip()],
+        rings=[model.mode_of(text) for text in mode or []],
+        profile=not covariance,
+        progress=advance,
+        start={key: value for key, (value,) in start or []},
+        bounds=dict(bounds or []),
+        priors=dict(prior or []),
+    )
     if save is not None:
         save_fit(found, save)
     if report:
@@ -316,7 +337,9 @@ def fit(
         raise typer.Exit(3)
 
 
-@measuring_command(epilog="frf record.csv --input hub_torque --output tip_acceleration=acc1 --save measured.csv")
+@measuring_command(
+    epilog="frf record.csv --input hub_torque --output tip_acceleration=acc1 --save measured.csv"
+)
 def frf(
     *,
     record: RecordName,

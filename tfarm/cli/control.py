@@ -36,7 +36,8 @@ from tfarm.files import mat_content, write_file
 
 command = partial(add_command, "Loop")
 ModelOrder = Annotated[
-    int | None, typer.Option("--modes", min=1, max=400, help="flexible modes; by default as many as the result takes")
+    int | None,
+    typer.Option("--modes", min=1, max=400, help="flexible modes; by default as many as the result takes"),
 ]
 
 
@@ -192,7 +193,12 @@ def map_plane(
 
 @command(epilog="map sasaki2012-lab --K1 -1,3 --K2 -2,2 --png map.png", name="map")
 def gain_map(
-    *, arm: ArmName, plane: Any = map_plane, theory: TheoryName = None, chain: Any = load_chain, show: Any = emit
+    *,
+    arm: ArmName,
+    plane: Any = map_plane,
+    theory: TheoryName = None,
+    chain: Any = load_chain,
+    show: Any = emit,
 ) -> None:
     """Stability region in the plane of two gains, with its boundary.
 
@@ -217,7 +223,12 @@ def gain_map(
 
 @command(epilog="sampled sasaki2012-lab --K1 0.3 --K2 0.3 --period 0.01")
 def sampled(
-    *, arm: ArmName, modes: ModelOrder = None, loop: Any = load_loop, chain: Any = load_chain, show: Any = emit_record
+    *,
+    arm: ArmName,
+    modes: ModelOrder = None,
+    loop: Any = load_loop,
+    chain: Any = load_chain,
+    show: Any = emit_record,
 ) -> None:
     """Stability, intervals, modes and margins of the sampled loop.
 

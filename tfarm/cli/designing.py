@@ -50,19 +50,23 @@ def design(
     arm: ArmName,
     objective: str = "damping",
     structure: Annotated[
-        str, typer.Option("--structure", help="form of the law, such as PD+notch; any other word lists them all")
+        str,
+        typer.Option("--structure", help="form of the law, such as PD+notch; any other word lists them all"),
     ] = TWO_GAINS,
     k1: Annotated[
         Any, typer.Option(f"--{RATE_GAIN}", parser=interval, metavar="LO,HI", help=f"bounds of {RATE_GAIN}")
     ] = None,
     k2: Annotated[
-        Any, typer.Option(f"--{MOMENT_GAIN}", parser=interval, metavar="LO,HI", help=f"bounds of {MOMENT_GAIN}")
+        Any,
+        typer.Option(f"--{MOMENT_GAIN}", parser=interval, metavar="LO,HI", help=f"bounds of {MOMENT_GAIN}"),
     ] = None,
     kp: AngleGain = 0.0,
     modes: ModeCount = 2,
     continuous: bool = False,
     also: Annotated[list[Any] | None, typer.Option(metavar="ARM", parser=str, callback=read_arms)] = None,
-    over: Annotated[list[Any] | None, typer.Option("--range", parser=named(interval), metavar="KEY=LO,HI")] = None,
+    over: Annotated[
+        list[Any] | None, typer.Option("--range", parser=named(interval), metavar="KEY=LO,HI")
+    ] = None,
     save: File = None,
     theory: TheoryName = None,
     chain: Any = load_chain,
@@ -104,12 +108,15 @@ def export(
     *,
     arm: ArmName,
     what: Annotated[str, typer.Option("--what", help="controller, tuner, plant or loop")],
-    form: Annotated[str, typer.Option("--as", help="c (C99), fmu, mat (MATLAB, Octave) or py (python-control)")],
+    form: Annotated[
+        str, typer.Option("--as", help="c (C99), fmu, mat (MATLAB, Octave) or py (python-control)")
+    ],
     out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="folder of the files")],
     tuned: Annotated[Path | None, typer.Option("--tuned", metavar="FILE", exists=True)] = None,
     precision: str = "double",
     ranges: Annotated[
-        list[Any] | None, typer.Option("--range", parser=named(numbers("SIGNAL=VALUE", 1)), metavar="SIGNAL=VALUE")
+        list[Any] | None,
+        typer.Option("--range", parser=named(numbers("SIGNAL=VALUE", 1)), metavar="SIGNAL=VALUE"),
     ] = None,
     name: str = "",
     anyway: Annotated[bool, typer.Option("--anyway")] = False,
@@ -193,12 +200,22 @@ def tuner_plan(
     from tfarm import tuner
 
     named: Any = {"mode": mode, "rule": rule, "sensitivity": sensitivity}
-    given = {name: value for name, value in (("signals", signals), ("duration", duration)) if value is not None}
+    given = {
+        name: value for name, value in (("signals", signals), ("duration", duration)) if value is not None
+    }
     return replace(
-        usual, cost=tuner.Cost(a=a, b=b), learning=tuner.Learning(**named, eta=eta, alpha=alpha, enough=enough),
-        trials=trials, seed=seed, count=modes, hidden=hidden, guard=guard, seventh_input=seventh_input,
-        **gains, **given,
-    )  # fmt: skip
+        usual,
+        cost=tuner.Cost(a=a, b=b),
+        learning=tuner.Learning(**named, eta=eta, alpha=alpha, enough=enough),
+        trials=trials,
+        seed=seed,
+        count=modes,
+        hidden=hidden,
+        guard=guard,
+        seventh_input=seventh_input,
+        **gains,
+        **given,
+    )
 
 
 @command(epilog="tune sasaki2012-lab --trials 100 --save tuned.json")
@@ -240,7 +257,9 @@ def tune(
             "default_gains": [RATE_GAIN],
             "default_gains_in_words": f"{RATE_GAIN} = {rate:.4g} (damping ratio 0.71 of the rigid arm under Kp)",
         }
-    tuned = tuner.tune(subject, plan(tuning.usual_plan(subject, sampling), {RATE_GAIN: rate, ANGLE_GAIN: kp}), sampling)
+    tuned = tuner.tune(
+        subject, plan(tuning.usual_plan(subject, sampling), {RATE_GAIN: rate, ANGLE_GAIN: kp}), sampling
+    )
     drawn = learning_curves(subject, tuned.plan, sampling, curves, advance) if curves else None
     compared = tuner.compare_controllers(tuned.trial, tuned.gain(), tuned.training.guard) if compare else None
     if save is not None:
@@ -327,15 +346,21 @@ def study_arguments(
     """
     from tfarm.studies.study import load_study
 
-    if "arm" in file.tables:  # an arm's file names no arm
-        refuse({f"--{key}": value for key, value in typed.items()}, f"the study is that of {file.name}; leave this out")
+    # an arm's file names no arm
+    if "arm" in file.tables:
+        refuse(
+            {f"--{key}": value for key, value in typed.items()},
+            f"the study is that of {file.name}; leave this out",
+        )
         return load_study(file), None
     case, defaults = loop(file)
     known = {key: value for key, value in typed.items() if value is not None}
     return {"arm": case.arm, "law": case.law, "chain": chain(file), **known}, defaults
 
 
-@study_command(epilog="study sasaki2012-lab --over payload.mass=uniform:0,0.2 --ask card --draws 100 --out study")
+@study_command(
+    epilog="study sasaki2012-lab --over payload.mass=uniform:0,0.2 --ask card --draws 100 --out study"
+)
 def study(
     *,
     arm: ArmName,
@@ -394,7 +419,9 @@ def study(
     }
     arguments, defaults = study_arguments(arm, typed, loop, chain)
     with nullcontext() if scheduler is None else cluster(scheduler) as client:
-        found = run(**arguments, out=out, workers=workers, stop_after=stop_after, progress=announce, client=client)
+        found = run(
+            **arguments, out=out, workers=workers, stop_after=stop_after, progress=announce, client=client
+        )
     page = None
     if report:
         from tfarm.report.writing import write_study

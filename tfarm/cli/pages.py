@@ -44,7 +44,9 @@ def report(
     *,
     arms: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[ARM ...]", help="presets or files; by default all", autocompletion=preset_names),
+        typer.Argument(
+            metavar="[ARM ...]", help="presets or files; by default all", autocompletion=preset_names
+        ),
     ] = None,
     out: Annotated[Path, typer.Option(metavar="FOLDER")] = Path("reports"),
     only: str | None = None,
@@ -78,7 +80,9 @@ def report(
     for file, arm in zip(files, subjects, strict=True):
         if others:
             runs = [
-                page.GivenLaw(load_law(file, arm, gains(), each)[0], Path(each.name).name, recording.load_run(each))
+                page.GivenLaw(
+                    load_law(file, arm, gains(), each)[0], Path(each.name).name, recording.load_run(each)
+                )
                 for each in others
             ]
         elif "law" in file.tables or gains():
@@ -146,7 +150,9 @@ def validate(*, show: Any = emit_record) -> None:
 @proof_command(epilog="proof glossary margin")
 def glossary(
     *,
-    words: Annotated[str | None, typer.Argument(metavar="[TERM]", help="part of a term; by default all")] = None,
+    words: Annotated[
+        str | None, typer.Argument(metavar="[TERM]", help="part of a term; by default all")
+    ] = None,
     show: Any = emit_record,
 ) -> None:
     """Words of certainty, terms, and quantities with their units.

@@ -18,10 +18,13 @@ from tfarm.cli.app import app, discard, print_line, progress
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, require
 from tfarm.files import STANDARD_OUTPUT
 
-STREAMED = ("--csv", "--figure", "--png", "--mat", "--save")  # files that may be "-", standard output
+# files that may be "-", standard output
+STREAMED = ("--csv", "--figure", "--png", "--mat", "--save")
 WRITTEN = (*STREAMED, "--animate")
-PATHS = (*WRITTEN, "--out", "--tuned", "--dsp", "--law", "--controller", "--list", "--posterior")  # such as 1_0
-CHAPTERS = ("Arm", "Loop", "Design", "Measure", "Study", "Report")  # of the help, in its order
+# such as 1_0
+PATHS = (*WRITTEN, "--out", "--tuned", "--dsp", "--law", "--controller", "--list", "--posterior")
+# of the help, in its order
+CHAPTERS = ("Arm", "Loop", "Design", "Measure", "Study", "Report")
 
 
 @cache  # some 35 ms, which a process with several commands need not spend on each
@@ -72,16 +75,19 @@ def run(arguments: list[str]) -> int:
     except (TfarmError, TyperException) as error:
         message = usage(error)
         code = 2
-    except (BrokenPipeError, SystemExit):  # the reader, head for instance, has left; rich leaves with it
+    except (BrokenPipeError, SystemExit):
+        # the reader, head for instance, has left; rich leaves with it
         discard(sys.stdout)
-    except OSError as error:  # of standard output, or of a folder that compiled code is kept in
+    except OSError as error:
+        # of standard output, or of a folder that compiled code is kept in
         discard(sys.stdout)
         remedy = "free some space, or write elsewhere (NUMBA_CACHE_DIR is the folder of compiled code)"
         message = f"{error.filename or 'standard output'}: {error.strerror or error}; {remedy}"
         code = 2
     if message:
         print_line(message)
-        try:  # what was printed before the error
+        # what was printed before the error
+        try:
             sys.stdout.flush()
         except OSError:
             discard(sys.stdout)
@@ -94,13 +100,15 @@ def call(arguments: list[str]) -> int:
     if arguments[0] not in command.commands:
         arguments = replace_old_name(arguments)
     check_words(arguments)
-    try:  # not command.main, which takes a closed pipe for an error
+    # not command.main, which takes a closed pipe for an error
+    try:
         command._main_shell_completion({}, "tfarm")
         with command.make_context("tfarm", list(arguments)) as context:
             command.invoke(context)
     except typer.Exit as stop:
         return stop.exit_code
-    except typer.Abort:  # of a question, by the end of the input or an interrupt
+    except typer.Abort:
+        # of a question, by the end of the input or an interrupt
         raise KeyboardInterrupt from None
     return 0
 
@@ -135,9 +143,13 @@ def open_streams() -> None:
 
 def check_words(arguments: list[str]) -> None:
     """Raise ParameterError for 5_0, Python's own spelling, an empty path, and a "-" that is no file or one of two."""
-    words = [word for argument in arguments for word in argument.split("=", 1 if argument.startswith("--") else 0)]
+    words = [
+        word for argument in arguments for word in argument.split("=", 1 if argument.startswith("--") else 0)
+    ]
     options = [(option, text) for option, text in pairwise(words) if option.startswith("--")]
-    takers = [option for option, text in options if text == STANDARD_OUTPUT] + ["--json"] * ("--json" in words)
+    takers = [option for option, text in options if text == STANDARD_OUTPUT] + ["--json"] * (
+        "--json" in words
+    )
     files = [text for option, text in options if option in WRITTEN and text != STANDARD_OUTPUT]
     for option, text in options:
         if option not in PATHS:
@@ -164,11 +176,14 @@ def usage(error: Any) -> str:
     if text.startswith("No such option"):
         name = error.option_name
         known = [option for each in error.ctx.command.params for option in each.opts]
-        meant = [option for option, others in hints()["options"].items() if name in others and option in known]
+        meant = [
+            option for option, others in hints()["options"].items() if name in others and option in known
+        ]
         if meant:
             return f"No such option: {name}. Did you mean {' or '.join(meant)}?"
         return text + hints()["other_commands"].get(name, "")
-    for problem in getattr(error.__cause__, "errors", list)():  # of pydantic, which converts for Typer
+    # of pydantic, which converts for Typer
+    for problem in getattr(error.__cause__, "errors", list)():
         of = error.param
         within = "" if None in (of.min, of.max) else f", from {of.min} to {of.max}"
         remedy = problem["msg"].removeprefix("Value error, ").replace("Input should", "should") + within

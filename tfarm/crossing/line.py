@@ -26,11 +26,11 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.errors import require
 from tfarm.records import frozen
 
-Parts = Callable[[Real], tuple[Complex, Complex]]  # A and B at places of a curve
+# A and B at places of a curve
+Parts = Callable[[Real], tuple[Complex, Complex]]
 
-LAST_BIT = 2.0**-53  # of a place, and of the narrowest bracket
-ROUNDED = 1e-11  # of |A| |B|: an imaginary part that may be rounding
-Window = tuple[float, float]  # two values of a gain, the lower first
+# two values of a gain, the lower first
+Window = tuple[float, float]
 
 
 class Crossing(NamedTuple):
@@ -99,9 +99,16 @@ def zeros_between(f: Callable[[Real, Whole], Real], low: Real, high: Real) -> Re
     `f` gives the values of some of them, by their numbers, at a place of each.  By SciPy's Chandrupatla (1997); `low`
     of a function that has one sign at both.
     """
+    # of a place, and of the narrowest bracket
+    last_bit = 2.0**-53
     if not low.size:
         return low
-    limits = {"xatol": LAST_BIT * float(abs(high - low).min()), "xrtol": 2 * LAST_BIT, "fatol": 0.0, "frtol": 0.0}
+    limits = {
+        "xatol": last_bit * float(abs(high - low).min()),
+        "xrtol": 2 * last_bit,
+        "fatol": 0.0,
+        "frtol": 0.0,
+    }
     found = find_root(f, (low, high), args=(np.arange(low.size),), tolerances=limits)  # type: ignore[call-overload]
     return np.where(found.success, found.x, low)
 
@@ -197,10 +204,13 @@ def crossings(curve: Curve, lines: Sequence[Line], *, with_dips: bool = False) -
 
     at = zeros_between(h, low, high)
     A, B = parts(at, np.arange(at.size), line)
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # B vanishes: the gain is infinite
+    # B vanishes: the gain is infinite
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         gain = -(A * B.conj()).real / abs(B) ** 2
     found: list[list[Crossing]] = [[] for _ in lines]
-    for number, *each in zip(line.tolist(), gain.tolist(), (origin + at).tolist(), change.tolist(), strict=True):
+    for number, *each in zip(
+        line.tolist(), gain.tolist(), (origin + at).tolist(), change.tolist(), strict=True
+    ):
         found[number].append(Crossing(*each))
     return found
 
@@ -213,10 +223,13 @@ def _dips(
     Two crossings lie there, as near to each other as a resonance is narrow, and h has one sign at the points of the
     grid.  The least of all dips are found together, by SciPy's Chandrupatla (1998).
     """
+    # of |A| |B|: an imaginary part that may be rounding
+    rounded = 1e-11
     inner = share[:, 1:-1]
     signs = np.sign(share[:, 1:-1])
-    lower = np.minimum(signs * share[:, :-2], signs * share[:, 2:])  # of the neighbours: below 0 where one is across
-    line, before = np.nonzero((abs(inner) <= lower) & (abs(inner) > ROUNDED))
+    # of the neighbours: below 0 where one is across
+    lower = np.minimum(signs * share[:, :-2], signs * share[:, 2:])
+    line, before = np.nonzero((abs(inner) <= lower) & (abs(inner) > rounded))
     sign = signs[line, before].astype(np.int64)
     (first, middle, *_), (_, last, *_) = curve.steps(before), curve.steps(before + 1)
     if not line.size:
@@ -227,7 +240,7 @@ def _dips(
 
     # 14 steps of a golden section leave a thousandth of two steps of the grid, of smooth functions far less
     dip = find_minimum(depth, (first, middle, last), args=(np.arange(line.size),), maxiter=14)
-    through = dip.f_x < -ROUNDED
+    through = dip.f_x < -rounded
     return line[through], first[through], dip.x[through], last[through], sign[through]
 
 
@@ -240,10 +253,13 @@ def check_ascending(name: str, values: Any, least: int, most: int) -> Real:
     """Check the values (n,) of one number of a plane.  Raises ParameterError unless they ascend, `least` to `most`."""
     try:
         values = np.atleast_1d(np.asarray(values, dtype=float))
-    except (TypeError, ValueError):  # no numbers
+    except (TypeError, ValueError):
+        # no numbers
         values = np.empty(0)
     ascends = least <= values.size <= most and np.isfinite(values).all() and (np.diff(values) > 0).all()
-    remedy = f"an ascending range of {least} to {most} finite values (give the law as law=, its numbers as vary=)"
+    remedy = (
+        f"an ascending range of {least} to {most} finite values (give the law as law=, its numbers as vary=)"
+    )
     require(ascends, name, f"{values.size} values", remedy)
     return np.asarray(values)
 
@@ -253,7 +269,10 @@ def counts_over(gains: Real, columns: Sequence[Crossings], reference: float, the
 
     `columns` are the crossings of each along the gain, `there` (columns,) the count at the gain `reference`.
     """
-    counts = [count + each.passed(gains) - each.passed(reference) for each, count in zip(columns, there, strict=True)]
+    counts = [
+        count + each.passed(gains) - each.passed(reference)
+        for each, count in zip(columns, there, strict=True)
+    ]
     return np.array(counts, dtype=np.int64).reshape(len(columns), gains.size)
 
 
@@ -264,7 +283,9 @@ def intervals(found: Crossings, low: float, high: float, reference: float, there
     return join_neighbours([pair for pair, count in zip(pairs, counts, strict=True) if not count])
 
 
-def confirm_intervals(found: Crossings, low: float, high: float, is_stable: Callable[[float], bool]) -> list[Window]:
+def confirm_intervals(
+    found: Crossings, low: float, high: float, is_stable: Callable[[float], bool]
+) -> list[Window]:
     """Return the intervals between `low` and `high`, which may be infinite, without zeros beyond the curve.
 
     Between two crossings the count is constant, and may be 0 only where it is least: there `is_stable` is evaluated at
@@ -274,10 +295,12 @@ def confirm_intervals(found: Crossings, low: float, high: float, is_stable: Call
     gains = found.within(low, high).gain
     # next to z = 1 one static crossing is read several times, each with an error near 1e-12
     edges = np.r_[low, gains[np.diff(gains, prepend=-np.inf) > 1e-9 * abs(gains)], high]
-    beyond = 2 * (abs(edges[np.isfinite(edges)]).max(initial=0.0) or 1.0)  # where nothing crosses: any value
+    # where nothing crosses: any value
+    beyond = 2 * (abs(edges[np.isfinite(edges)]).max(initial=0.0) or 1.0)
     inner = np.clip(edges, -beyond, beyond)
     middles = (inner[1:] + inner[:-1]) / 2
-    counts = found.passed(middles)  # the same up to a constant
+    # the same up to a constant
+    counts = found.passed(middles)
     for may_be in (counts == counts.min(), counts > counts.min()):
         stable = [i for i in np.flatnonzero(may_be).tolist() if is_stable(float(middles[i]))]
         if stable:

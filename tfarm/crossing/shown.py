@@ -36,7 +36,9 @@ class PlaneOfCounts(ABC):
         return np.asarray(np.equal(self.counts, 0))
 
     @property
-    def finding(self) -> Annotated[str, Quantity("stability region", help="points of the grid without unstable pole")]:
+    def finding(
+        self,
+    ) -> Annotated[str, Quantity("stability region", help="points of the grid without unstable pole")]:
         """Number of points of the grid at which the loop is stable."""
         return f"stable at {int(self.stable.sum())} of {self.stable.size} points"
 
@@ -55,7 +57,9 @@ class PlaneOfCounts(ABC):
             there = count(*at)
             if there not in (here, None):
                 where = ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.vary, at, strict=True))
-                raise ConvergenceError(f"at {where} {there} poles are unstable, not {here}: {remedy}", self, there)
+                raise ConvergenceError(
+                    f"at {where} {there} poles are unstable, not {here}: {remedy}", self, there
+                )
 
     @property
     def axes(self) -> tuple[Real, Real]:
@@ -76,8 +80,12 @@ class PlaneOfCounts(ABC):
     def csv_table(self) -> Table:
         """One row for each point of the grid: both numbers, and the count."""
         pairs = zip(self.vary, np.meshgrid(self.x, self.y), strict=True)
-        columns = [Column(name.replace(".", "_").replace("@", "_at_"), of=values.ravel()) for name, values in pairs]
-        return Table(columns=(*columns, Column("unstable_roots", of=[count for row in self.counts for count in row])))
+        columns = [
+            Column(name.replace(".", "_").replace("@", "_at_"), of=values.ravel()) for name, values in pairs
+        ]
+        return Table(
+            columns=(*columns, Column("unstable_roots", of=[count for row in self.counts for count in row]))
+        )
 
     @property
     def drawing(self) -> str:
@@ -87,7 +95,10 @@ class PlaneOfCounts(ABC):
         up = max(1, self.y.size // most_lines)
         across = max(1, self.x.size // most_characters)
         rows = list(zip(self.y, self.counts, strict=True))[::-up]
-        lines = [f"{value:9.3g} " + "".join("#" if count else "." for count in row[::across]) for value, row in rows]
+        lines = [
+            f"{value:9.3g} " + "".join("#" if count else "." for count in row[::across])
+            for value, row in rows
+        ]
         name, other = self.vary
         legend = f"{other} up, {name} from {self.x[0]:g} to {self.x[-1]:g} to the right; . stable, # unstable"
         return "\n".join([*lines, legend])

@@ -19,10 +19,14 @@ from numpy.typing import NDArray
 from tfarm.arrays import Complex, Real
 from tfarm.crossing.line import Window
 
-STRETCH = 2.0  # how much wider than high, or higher than wide, a picture is at most: so much more a curve turns in it
-MOST_TURN = math.radians(5.0) / STRETCH  # from one piece of a curve to the next, where the picture is as high as wide
-PIXEL = 2e-3  # of the picture, a pixel: corners of shorter pieces are invisible
-Slice = tuple[float, float, float]  # a value of the gain across, and an interval of the other there
+# how much wider than high, or higher than wide, a picture is at most: so much more a curve turns in it
+STRETCH = 2.0
+# from one piece of a curve to the next, where the picture is as high as wide
+MOST_TURN = math.radians(5.0) / STRETCH
+# of the picture, a pixel: corners of shorter pieces are invisible
+PIXEL = 2e-3
+# a value of the gain across, and an interval of the other there
+Slice = tuple[float, float, float]
 
 
 def loose(curves: Complex, width: Real | float, height: Real | float) -> NDArray[np.bool_]:
@@ -103,12 +107,16 @@ def pieces(across: Real, intervals: Sequence[Sequence[Window]]) -> list[RegionPi
             children = [b for a, b in links if a == i]
             parents = [a for a, b in links if b == j]
             piece = going[i]
-            if len(children) > 1:  # a part of an interval begins
+            # a part of an interval begins
+            if len(children) > 1:
                 piece.ends = False
-                piece = RegionPiece([_share(last[i], [here[b] for b in children], children.index(j))], begins=False)
+                piece = RegionPiece(
+                    [_share(last[i], [here[b] for b in children], children.index(j))], begins=False
+                )
                 found.append(piece)
             piece.points.append(_share(here[j], [last[a] for a in parents], parents.index(i)))
-            if len(parents) > 1:  # here several parts join
+            # here several parts join
+            if len(parents) > 1:
                 piece.ends = following[j].begins = False
             else:
                 following[j] = piece

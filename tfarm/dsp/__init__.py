@@ -23,9 +23,20 @@ __all__ = [
 ]
 
 # modules and names that this room had up to version 1.0, and where their names are
-_OF_CHAIN = ("Actuator", "Chain", "Converters", "Sampling", "Slew", "chain_of_tables", "file_text", "load_chain")
+_OF_CHAIN = (
+    "Actuator",
+    "Chain",
+    "Converters",
+    "Sampling",
+    "Slew",
+    "chain_of_tables",
+    "file_text",
+    "load_chain",
+)
 chain = moved_module(f"{__name__}.chain", dict.fromkeys(_OF_CHAIN, "tfarm.arm.chain"))
-sampled = moved_module(f"{__name__}.sampled", dict.fromkeys(("Sampled", "sampled_loop"), "tfarm.loop.sampled"))
+sampled = moved_module(
+    f"{__name__}.sampled", dict.fromkeys(("Sampled", "sampled_loop"), "tfarm.loop.sampled")
+)
 _MOVED = {
     "Analysis": "tfarm.loop.sampled_verdict",
     "GainMap": "tfarm.loop.circle_crossings",

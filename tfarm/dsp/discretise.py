@@ -36,7 +36,6 @@ from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.gains import check_gains
 
-ROUNDINGS = 8  # of each term of F: of its product of n factors they add up as the root of n
 RULE = Quantity("discretisation", help="rule by which the continuous-time controller is made discrete")
 
 
@@ -50,7 +49,9 @@ def discretise_law(law: Law, period: float) -> Law:
         # 1/100 s in two files may differ in its last digits
         require(math.isclose(law.period, period, rel_tol=1e-9), "period", law.period, remedy)
         return law
-    remedy = f"tustin keeps the values at a frequency below half the sample rate, {math.pi / period:.4g} rad/s"
+    remedy = (
+        f"tustin keeps the values at a frequency below half the sample rate, {math.pi / period:.4g} rad/s"
+    )
     is_kept = not law.prewarp or (law.rule == "tustin" and law.prewarp * period < math.pi)
     require(is_kept, "prewarp", law.prewarp, remedy)
     parts = tuple(Part(part.signals, _in_z(part, law, period)) for part in law.parts)
@@ -103,7 +104,8 @@ def prewarp_speed(period: float, prewarp: float) -> float:
 
 def by_scipy(block: LawBlock, period: float, rule: Literal["zoh", "bilinear"]) -> StateSpace:
     """The block in z by a rule of `scipy.signal.cont2discrete`."""
-    from scipy.signal import cont2discrete  # here, because it takes a while to load
+    # here, because it takes a while to load
+    from scipy.signal import cont2discrete
 
     return StateSpace(*cont2discrete(block.matrices(), period, rule)[:4])
 
@@ -162,7 +164,9 @@ def _single_block(block: LawBlock) -> LawBlock:
     """A block in the numbers of float32; a constant gain remains one."""
     with np.errstate(over="ignore"):
         matrices = [each.astype(np.float32).astype(float) for each in block.matrices()]
-    remedy = f"a number of the law is beyond {np.finfo(np.float32).max:.1e}: scale its states, or take float64"
+    remedy = (
+        f"a number of the law is beyond {np.finfo(np.float32).max:.1e}: scale its states, or take float64"
+    )
     require(all(np.isfinite(each).all() for each in matrices), "converters.arithmetic", "float32", remedy)
     is_gain = isinstance(block, Rational) and not block.order
     return Rational((float(matrices[3][0, 0]),)) if is_gain else StateSpace(*matrices)
@@ -201,7 +205,8 @@ def _differenced(part: Part, a: float, T: float) -> Part:
 # ------------------------------------------------------------ factors
 
 
-PartColumn = tuple[int, int, float, Complex]  # part, row of the signal, and g and zeros of g prod(delta - zeros)
+# part, row of the signal, and g and zeros of g prod(delta - zeros)
+PartColumn = tuple[int, int, float, Complex]
 
 
 @frozen
@@ -235,9 +240,16 @@ class LawInZ:
         out = []
         for part, (poles, weight) in enumerate(zip(self.part_poles, weights, strict=True)):
             held, below = lowest_power(poles)
-            terms = [(*lowest_power(zeros), weight * g * turned[row]) for n, row, g, zeros in self.columns if n == part]
-            by_order = [[value * factor for n, value, factor in terms if n == order] for order in range(held + 1)]
-            is_reached = held and len(terms) == 1 and terms[0][2]  # an integrator of the only signal, cancelled or not
+            terms = [
+                (*lowest_power(zeros), weight * g * turned[row])
+                for n, row, g, zeros in self.columns
+                if n == part
+            ]
+            by_order = [
+                [value * factor for n, value, factor in terms if n == order] for order in range(held + 1)
+            ]
+            # an integrator of the only signal, cancelled or not
+            is_reached = held and len(terms) == 1 and terms[0][2]
             if is_reached or not all(map(_cancel, by_order[:held])):
                 return False
             out += [each / below for each in by_order[held]]
@@ -265,19 +277,24 @@ def law_in_z(law: Law, acting: Law, chain: Chain) -> LawInZ:
     alone = [acting.weighted(row).matrices() for row in np.eye(len(acting.parts)).tolist()]
     (A, B, _, _), C, D = alone[0], *(np.vstack([each[n] for each in alone]) for n in (2, 3))
     found = [_factors(part, law, chain) for part in law.parts]
-    columns = [(n, acting.signals.index(name), g, zeros) for n, (_, of) in enumerate(found) for name, g, zeros in of]
+    columns = [
+        (n, acting.signals.index(name), g, zeros) for n, (_, of) in enumerate(found) for name, g, zeros in of
+    ]
     return LawInZ(acting.signals, tuple(poles for poles, _ in found), tuple(columns), (A, B, C, D))
 
 
 def _factors(part: Part, law: Law, chain: Chain) -> tuple[Complex, list[tuple[str, float, Complex]]]:
     """The poles of one part in z, and signal, gain and zeros of each column."""
     T = chain.sampling.period
-    poles, found = block_factors(part.block, "none" if law.is_discrete else law.rule, T, prewarp_speed(T, law.prewarp))
+    poles, found = block_factors(
+        part.block, "none" if law.is_discrete else law.rule, T, prewarp_speed(T, law.prewarp)
+    )
     columns = [(name, -law.sign * g, zeros) for name, (g, zeros) in zip(part.signals, found, strict=True)]
     columns = [each for each in columns if is_measured(each[0])]
     if chain.converters.hub_rate != "difference" or "hub_rate" not in part.signals:
         return poles, columns
-    lag = float(np.expm1(-chain.converters.rate_filter * T))  # -lag/T delta/(delta - lag) times the angle
+    # -lag/T delta/(delta - lag) times the angle
+    lag = float(np.expm1(-chain.converters.rate_filter * T))
     return np.r_[poles, lag], [
         ("hub_angle", -g * lag / T, np.r_[zeros, 0.0]) if name == "hub_rate" else (name, g, np.r_[zeros, lag])
         for name, g, zeros in columns
@@ -291,8 +308,10 @@ def root_product(start: Complex, roots: Complex, more: Any = 0.0) -> Complex:
 
 def root_product_error(start: Complex, roots: Complex, more: Any) -> Real:
     """Bound on the rounding error of that product; a root that is the start is exact."""
+    # of each term of F: of its product of n factors they add up as the root of n
+    roundings = 8
     away = start[:, None] - roots
     sizes = abs(away + np.reshape(more, (-1, 1)))
     blur = np.where(away == 0, 0.0, MACHINE_EPS * (abs(start)[:, None] + abs(roots)))
     most = (sizes + blur).prod(axis=1)
-    return most - sizes.prod(axis=1) + MACHINE_EPS * ROUNDINGS * most
+    return most - sizes.prod(axis=1) + MACHINE_EPS * roundings * most

@@ -18,10 +18,24 @@ from tfarm.exact.compiled import compiled, inlined
 CONSUMER = Consumer(
     "simulate",
     acts=(
-        "reference", "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "law",
-        "arithmetic", "DAC steps", "DAC range", "torque limit", "hold", "delay", "hub damping", "plant", "volts",
+        "reference",
+        "anti-alias filter",
+        "encoder",
+        "hub rate",
+        "amplifier steps",
+        "amplifier range",
+        "law",
+        "arithmetic",
+        "DAC steps",
+        "DAC range",
+        "torque limit",
+        "hold",
+        "delay",
+        "hub damping",
+        "plant",
+        "volts",
     ),
-)  # fmt: skip
+)
 
 # of the outputs, which begin with what is fed back (`tfarm.arm.FED_BACK`)
 ANGLE = 0
@@ -35,21 +49,12 @@ DAC = 2
 DOUBLY = 0
 ONCE = 1
 # of a piece of a sample: its length [s], whether the new torque acts, a record
-DURATION = 0
-IS_NEW = 1
-IS_RECORD = 2
 # of `work` [J]: done on the hub, and the sum of its absolute values
 DONE = 0
-MOVED = 1
 # of a row of the quantisers
-STEP = 0
-LOWEST = 1
-HIGHEST = 2
 # memory of the estimate of the hub rate
-ANGLE_BEFORE = 0
-RATE_BEFORE = 1
-BEGUN = 2
-YES = 0.5  # a number above it is true among floats
+# a number above it is true among floats
+YES = 0.5
 
 
 class SampleModel(NamedTuple):
@@ -161,11 +166,16 @@ def advance_state(k: int, model: Any, state: Any, old: float, new: float, push_o
 
     Fills a row of `fine` at each record, and adds to the work.
     """
+    # of a piece of a sample: its length [s], whether the new torque acts, a record
+    duration = 0
+    is_new = 1
+    is_record = 2
+    moved = 1
     row = 0
     before = dynamic_output(model.hub, model, state)
     for s in range(model.piece.shape[0]):
-        torque = (new if model.piece[s, IS_NEW] > YES else old) + push_on
-        dt = model.piece[s, DURATION]
+        torque = (new if model.piece[s, is_new] > YES else old) + push_on
+        dt = model.piece[s, duration]
         for i in range(state.amplitude.size):
             about = state.amplitude[i] + model.rest[i] * torque
             state.circle[i] = max(state.circle[i], about.real * about.real + about.imag * about.imag)
@@ -175,9 +185,9 @@ def advance_state(k: int, model: Any, state: Any, old: float, new: float, push_o
         after = dynamic_output(model.hub, model, state)
         done = torque * (after - before)
         state.work[DONE] += done
-        state.work[MOVED] += abs(done)
+        state.work[moved] += abs(done)
         before = after
-        if model.piece[s, IS_RECORD] > YES and row < state.fine.shape[1]:
+        if model.piece[s, is_record] > YES and row < state.fine.shape[1]:
             read_outputs(model, state, torque, state.fine[k, row])
             row += 1
 
@@ -185,24 +195,34 @@ def advance_state(k: int, model: Any, state: Any, old: float, new: float, push_o
 @compiled
 def quantise(value: float, row: Any, saturated: Any, which: int) -> float:
     """`value` on the steps of a converter, clipped to its range and then marked in `saturated` (3,)."""
-    if row[STEP] > 0.0:
-        value = np.rint(value / row[STEP]) * row[STEP]
-    saturated[which] = value > row[HIGHEST] or value < row[LOWEST]
-    return min(max(value, row[LOWEST]), row[HIGHEST])
+    # of a row of the quantisers
+    step = 0
+    lowest = 1
+    highest = 2
+    if row[step] > 0.0:
+        value = np.rint(value / row[step]) * row[step]
+    saturated[which] = value > row[highest] or value < row[lowest]
+    return min(max(value, row[lowest]), row[highest])
 
 
 @compiled
-def estimate(angle: float, rate: float, memory: Any, is_differenced: bool, pole: float, period: float) -> float:
+def estimate(
+    angle: float, rate: float, memory: Any, is_differenced: bool, pole: float, period: float
+) -> float:
     """The hub rate of the controller: a reading of its own, or the filtered difference of the encoder."""
+    # memory of the estimate of the hub rate
+    angle_before = 0
+    rate_before = 1
+    begun = 2
     if not is_differenced:
         return rate
-    if memory[BEGUN] < YES:
-        memory[ANGLE_BEFORE] = angle
-        memory[BEGUN] = 1.0
-    step = angle - memory[ANGLE_BEFORE]
-    memory[RATE_BEFORE] = pole * memory[RATE_BEFORE] + (1.0 - pole) * step / period
-    memory[ANGLE_BEFORE] = angle
-    return memory[RATE_BEFORE]
+    if memory[begun] < YES:
+        memory[angle_before] = angle
+        memory[begun] = 1.0
+    step = angle - memory[angle_before]
+    memory[rate_before] = pole * memory[rate_before] + (1.0 - pole) * step / period
+    memory[angle_before] = angle
+    return memory[rate_before]
 
 
 def convert_outputs(record: Any, saturated: Any, memory: Any, of: Any) -> Any:
@@ -224,7 +244,8 @@ def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> No
     ring = state.held.size
     old = state.held[(k - of.delay - 1) % ring]
     state.held[k % ring] = state.torque[k] = quantise(u, of.quantisers[DAC], state.saturated[k], DAC)
-    if k == 0:  # the impulse: every amplitude jumps by it
+    # the impulse: every amplitude jumps by it
+    if k == 0:
         for i in range(state.amplitude.size):
             state.amplitude[i] += forcing.impulse
         state.rigid[ONCE] += forcing.impulse
@@ -283,7 +304,9 @@ def run_samples(
         for j in range(sources.size):
             source = sources[j]
             value = 0.0 if source < 0 else known[source] if source < known.size else record[source]
-            z[order + j] = to_precision(to_precision(references[k, j], single) - to_precision(value, single), single)
+            z[order + j] = to_precision(
+                to_precision(references[k, j], single) - to_precision(value, single), single
+            )
         law_step(table, z, to_precision(forcing.feedforward[k], single), single, following)
         for i in range(order):
             z[i] = following[i]

@@ -45,12 +45,19 @@ from tfarm.spectrum.frequencies import LISTS_KEPT
 if TYPE_CHECKING:
     import control
 
-RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")  # of a simulation, not filtered
-MODES_USED = Quantity("flexible modes", help="number of flexible modes of the arm in the model of the sampled loop")
-USUAL_MODES = 20  # flexible, of a sampled loop or a simulation by default
-SLOW = 0.1  # |p| T below which a pole is slow: its two parts are then more than ten times their sum
-OVERDAMPED = 2.5  # C w from which on a mode surely is: following it further costs a hundred times as much
-FORGOTTEN = 40.0  # e^-40 = 4e-18: such a pole has settled before the next sample
+# of a simulation, not filtered
+RECORDED = ("hub_angle", "hub_rate", "root_moment", "tip_displacement")
+MODES_USED = Quantity(
+    "flexible modes", help="number of flexible modes of the arm in the model of the sampled loop"
+)
+# flexible, of a sampled loop or a simulation by default
+USUAL_MODES = 20
+# |p| T below which a pole is slow: its two parts are then more than ten times their sum
+SLOW = 0.1
+# C w from which on a mode surely is: following it further costs a hundred times as much
+OVERDAMPED = 2.5
+# e^-40 = 4e-18: such a pole has settled before the next sample
+FORGOTTEN = 40.0
 
 
 @frozen
@@ -77,11 +84,14 @@ class Plant:
 
     def rows(self, at: Sequence[int], names: tuple[str, ...]) -> Plant:
         """The plant with these of its outputs, in this order, under these names."""
-        return replace(self, outputs=names, residues=self.residues[at], rigid=self.rigid[at], static=self.static[at])
+        return replace(
+            self, outputs=names, residues=self.residues[at], rigid=self.rigid[at], static=self.static[at]
+        )
 
     def joined(self, more: Plant) -> Plant:
         """The plant with the outputs of another of the same arm after its own; the other may lack the filter's pole."""
-        assert np.array_equal(more.poles, self.poles[: more.poles.size])  # those of the arm, for any output
+        # those of the arm, for any output
+        assert np.array_equal(more.poles, self.poles[: more.poles.size])
         lacking = self.poles.size - more.poles.size
         return replace(
             self,
@@ -221,8 +231,13 @@ class SensedPlant:
         """All signals in the order of their names, without filters."""
         places = dict.fromkeys(self.read.places)
         whole = reduce(Plant.joined, self.plants)
-        keys = [(place, name) for place, plant in zip(places, self.plants, strict=True) for name in plant.outputs]
-        at = [keys.index((place, each.name)) for each, place in zip(self.read.outputs, self.read.places, strict=True)]
+        keys = [
+            (place, name) for place, plant in zip(places, self.plants, strict=True) for name in plant.outputs
+        ]
+        at = [
+            keys.index((place, each.name))
+            for each, place in zip(self.read.outputs, self.read.places, strict=True)
+        ]
         return replace(whole.rows(at, self.read.names), arm=self.arm)
 
     def own_moment(self, sampling: Sampling) -> Real:
@@ -410,7 +425,9 @@ class PulseTransfer:
         A[n - 2, n - 1] = T
         A[n:, n:] = np.eye(d + 1, k=-1)
         pairs = np.ascontiguousarray(2 * self.residues[:, upper].conj()).view(float)
-        C = np.c_[pairs, self.residues[:, real].real, self.plant.rigid, np.zeros((len(pairs), d)), self.plant.static]
+        C = np.c_[
+            pairs, self.residues[:, real].real, self.plant.rigid, np.zeros((len(pairs), d)), self.plant.static
+        ]
         now, before = (
             np.r_[push[upper].view(float), push[real].real, ramp, push[-1].real]
             for push, ramp in zip((self.early, self.late), self.ramps, strict=True)
@@ -423,7 +440,8 @@ class PulseTransfer:
             place = 2 * upper.size + int(np.flatnonzero(real == slow)[0])
             p = float(self.plant.poles[slow].real)
             self._integrate(A, newest, p, (place, n - 1))
-            C[:, place] += self.plant.rigid[:, 1]  # R/s + r/(s - p) = -R p/(s (s - p)) + (r + R)/(s - p)
+            # R/s + r/(s - p) = -R p/(s (s - p)) + (r + R)/(s - p)
+            C[:, place] += self.plant.rigid[:, 1]
             C[:, n - 1] = -p * self.plant.rigid[:, 1]
         return A, B, C
 
@@ -456,13 +474,18 @@ class PulseTransfer:
             np.zeros((len(C), 1)),
             self.sampling.period,
             inputs=["hub_torque"],
-            outputs=[name.replace(".", "_") for name in self.plant.outputs],  # a dot separates a system and its signal
+            # a dot separates a system and its signal
+            outputs=[name.replace(".", "_") for name in self.plant.outputs],
             name=f"{self.plant.arm.name} sampled",
         )
 
 
 def pulse_transfer(
-    arm: Arm, outputs: tuple[str, ...] | list[str], sampling: Sampling | None = None, *, count: int = USUAL_MODES
+    arm: Arm,
+    outputs: tuple[str, ...] | list[str],
+    sampling: Sampling | None = None,
+    *,
+    count: int = USUAL_MODES,
 ) -> PulseTransfer:
     """Return the sampled arm with `count` flexible modes: exact for its modal model, callable at z, `.state_space()`.
 

@@ -28,9 +28,8 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Column, Quantity, Table
 
-MODE_COUNTS = (10, 20, 40)  # flexible modes; 80 would take a heavily damped arm 8 s of CPU time
-ENOUGH_CHANGE = 1e-4  # of each signal's largest value: the digits of a table of a simulation
-CYCLE_LASTS = 0.7  # a limit cycle keeps at least this much of its amplitude over a quarter of the record
+# of each signal's largest value: the digits of a table of a simulation
+ENOUGH_CHANGE = 1e-4
 
 
 class Enough(NamedTuple):
@@ -40,8 +39,15 @@ class Enough(NamedTuple):
     """
 
     modes: Annotated[int, replace(MODES_USED, key="modes_used")]
-    change: Annotated[float | None, Quantity("change of signals from half of them", digits=2, key="modes_change",
-            help="largest relative change of a signal when the number of modes was doubled")]  # fmt: skip
+    change: Annotated[
+        float | None,
+        Quantity(
+            "change of signals from half of them",
+            digits=2,
+            key="modes_change",
+            help="largest relative change of a signal when the number of modes was doubled",
+        ),
+    ]
 
 
 def enough_modes(simulate: Callable[[int], Simulation], count: int | None = None) -> Enough:
@@ -49,14 +55,17 @@ def enough_modes(simulate: Callable[[int], Simulation], count: int | None = None
 
     `simulate` makes the simulation with a number of modes, its converters ideal, as quantisation would hide the modes.
     """
+    # flexible modes; 80 would take a heavily damped arm 8 s of CPU time
+    mode_counts = (10, 20, 40)
     if count is not None:
         return Enough(count, None)
-    before = simulate(MODE_COUNTS[0])
-    found = Enough(MODE_COUNTS[0], np.inf)
-    for count in MODE_COUNTS[1:]:
+    before = simulate(mode_counts[0])
+    found = Enough(mode_counts[0], np.inf)
+    for count in mode_counts[1:]:
         try:
             now = simulate(count)
-        except ConvergenceError:  # two damped modes are not distinguished: the number before is used
+        except ConvergenceError:
+            # two damped modes are not distinguished: the number before is used
             break
         off = change(before.at_samples, now.at_samples)
         before = now
@@ -70,8 +79,10 @@ def change(before: Trace, after: Trace) -> float:
     """The largest change of any signal at the samples of both, relative to that signal's largest value."""
     n = min(before.t.size, after.t.size)
     pairs = [(before.signal(name)[:n], after.signal(name)[:n]) for name in after.names]
-    return max(float(abs(new - old).max(initial=0.0) / max(abs(new).max(initial=0.0), LEAST_SIZE))
-               for old, new in pairs)  # fmt: skip
+    return max(
+        float(abs(new - old).max(initial=0.0) / max(abs(new).max(initial=0.0), LEAST_SIZE))
+        for old, new in pairs
+    )
 
 
 @dataclass(frozen=True)
@@ -82,16 +93,53 @@ class LimitCycle:
     "saturation" where a signal is still clipped (an unstable loop within its limits), else "quantisation".
     """
 
-    root_moment: Annotated[float, Quantity("root moment amplitude", "N m", 4, key="root_moment_amplitude",
-            help="half of the root moment's range in the last quarter of the record")]  # fmt: skip
-    hub_rate: Annotated[float, Quantity("hub rate amplitude", "rad/s", 4, key="hub_rate_amplitude",
-            help="half of the hub rate's range in the last quarter of the record")]  # fmt: skip
-    torque: Annotated[float, Quantity("torque amplitude", "N m", 4, key="torque_amplitude",
-            help="half of the torque's range in the last quarter of the record")]  # fmt: skip
-    frequency: Annotated[float, Quantity("frequency", "rad/s", 4,
-            help="frequency of the sampled root moment, from its zero crossings about its mean")]  # fmt: skip
-    kept_up_by: Annotated[Literal["quantisation", "saturation"], Quantity("sustained by", key="kept_up_by",
-            help="saturation of a signal in an unstable loop, or quantisation")]  # fmt: skip
+    root_moment: Annotated[
+        float,
+        Quantity(
+            "root moment amplitude",
+            "N m",
+            4,
+            key="root_moment_amplitude",
+            help="half of the root moment's range in the last quarter of the record",
+        ),
+    ]
+    hub_rate: Annotated[
+        float,
+        Quantity(
+            "hub rate amplitude",
+            "rad/s",
+            4,
+            key="hub_rate_amplitude",
+            help="half of the hub rate's range in the last quarter of the record",
+        ),
+    ]
+    torque: Annotated[
+        float,
+        Quantity(
+            "torque amplitude",
+            "N m",
+            4,
+            key="torque_amplitude",
+            help="half of the torque's range in the last quarter of the record",
+        ),
+    ]
+    frequency: Annotated[
+        float,
+        Quantity(
+            "frequency",
+            "rad/s",
+            4,
+            help="frequency of the sampled root moment, from its zero crossings about its mean",
+        ),
+    ]
+    kept_up_by: Annotated[
+        Literal["quantisation", "saturation"],
+        Quantity(
+            "sustained by",
+            key="kept_up_by",
+            help="saturation of a signal in an unstable loop, or quantisation",
+        ),
+    ]
 
 
 @dataclass(frozen=True)
@@ -101,12 +149,17 @@ class Run(OfCase):
     case: Case
     simulation: Annotated[Simulation, Quantity(flat=True, help="figures of the signals")]
     used: Annotated[Enough, Quantity(flat=True, help="flexible modes of the simulation")]
-    scenario_in_words: Annotated[str, Quantity("scenario", key="scenario_in_words",
-            help="reference or disturbance with its size")]  # fmt: skip
-    tuner: Annotated[dict[str, Any] | None, Quantity("tuner", key="controller", help="that set the moment gain")] = None
+    scenario_in_words: Annotated[
+        str, Quantity("scenario", key="scenario_in_words", help="reference or disturbance with its size")
+    ]
+    tuner: Annotated[
+        dict[str, Any] | None, Quantity("tuner", key="controller", help="that set the moment gain")
+    ] = None
 
     @property
-    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
+    def controller(
+        self,
+    ) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return controller(self.case.feedback, self.arm)
 
@@ -121,14 +174,23 @@ class Run(OfCase):
         return rule_in_words(self.case.feedback)
 
     @property
-    def reading(self) -> Annotated[str, Quantity(
-            help="moment that is fed back: vibration, without the rigid arm's, or total")]:  # fmt: skip
+    def reading(
+        self,
+    ) -> Annotated[
+        str, Quantity(help="moment that is fed back: vibration, without the rigid arm's, or total")
+    ]:
         """The moment that is fed back during a slew."""
         return self.simulation.chain.slew.reading
 
     @property
-    def note(self) -> Annotated[str | None, Quantity("not determined", key="note",
-            help="reason for a residual or a settling time without a value")]:  # fmt: skip
+    def note(
+        self,
+    ) -> Annotated[
+        str | None,
+        Quantity(
+            "not determined", key="note", help="reason for a residual or a settling time without a value"
+        ),
+    ]:
         """The reason why there is no residual or no settling time."""
         run = self.simulation
         ends = "the record ends before the slew"
@@ -141,20 +203,34 @@ class Run(OfCase):
         return "; ".join(reason for reason, value in reasons.items() if value is None) or None
 
     @property
-    def stopped_at(self) -> Annotated[float | None, Quantity(key="stopped_at_s",
-            help="time at which the simulation of an unstable loop was stopped")]:  # fmt: skip
+    def stopped_at(
+        self,
+    ) -> Annotated[
+        float | None,
+        Quantity(key="stopped_at_s", help="time at which the simulation of an unstable loop was stopped"),
+    ]:
         """The time at which an unstable loop was stopped [s]."""
         return None if (stop := self.simulation.stopped) is None else stop.time
 
     @property
-    def growing_mode(self) -> Annotated[int | None, Quantity(
-            help="mode with the largest share in the root moment at the stop, 0 for the hub")]:  # fmt: skip
+    def growing_mode(
+        self,
+    ) -> Annotated[
+        int | None, Quantity(help="mode with the largest share in the root moment at the stop, 0 for the hub")
+    ]:
         """The unstable mode, 0 for the hub."""
         return None if (stop := self.simulation.stopped) is None else stop.mode
 
     @cached_property
-    def limit_cycle(self) -> Annotated[LimitCycle | None, Quantity("limit cycle",
-            help="sustained vibration at the end of the record that ideal converters do not have")]:  # fmt: skip
+    def limit_cycle(
+        self,
+    ) -> Annotated[
+        LimitCycle | None,
+        Quantity(
+            "limit cycle",
+            help="sustained vibration at the end of the record that ideal converters do not have",
+        ),
+    ]:
         """The limit cycle, by the same simulation with ideal converters; None under a tuner."""
         run = self.simulation
         if run.chain.is_linear or self.tuner is not None:
@@ -168,7 +244,9 @@ class Run(OfCase):
         return self.arm.input_unit
 
     @property
-    def signals(self) -> Annotated[dict[str, Real], Quantity(flat=True, help="time and signals at the samples")]:
+    def signals(
+        self,
+    ) -> Annotated[dict[str, Real], Quantity(flat=True, help="time and signals at the samples")]:
         """Time and signals at the samples, by name."""
         run = self.simulation
         gain = np.empty(0) if run.gain is None else run.gain
@@ -176,7 +254,9 @@ class Run(OfCase):
         return run.at_samples.by_name | {"torque": run.torque, "gain": gain} | volts
 
     @property
-    def between(self) -> Annotated[dict[str, Real] | None, Quantity(help="signals at the records between two samples")]:
+    def between(
+        self,
+    ) -> Annotated[dict[str, Real] | None, Quantity(help="signals at the records between two samples")]:
         """The same between the samples, of the signals that change there."""
         return None if (between := self.simulation.between) is None else between.by_name
 
@@ -209,6 +289,8 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     A quarter earlier it was not much larger, and, where signals are still clipped, not much smaller either.  The same
     loop with ideal converters (`ideal`) has decayed further, or is unstable where signals are clipped.
     """
+    # a limit cycle keeps at least this much of its amplitude over a quarter of the record
+    cycle_lasts = 0.7
     n = simulation.t.size
     # a shorter record shows no limit cycle
     if simulation.stopped or simulation.chain.is_linear or n < 40:
@@ -222,12 +304,12 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     turns = np.count_nonzero(np.diff(np.signbit(about))) / 2
     is_clipped = bool(simulation.saturated_at[last].any())
     # fewer turns of the moment about its mean are a drift and no vibration
-    is_transient = is_clipped and (earlier < CYCLE_LASTS * size or turns < 1)
+    is_transient = is_clipped and (earlier < cycle_lasts * size or turns < 1)
     # in a quarter of the record: a smaller change may be one of sampled peaks
     is_unstable = ideal.stopped is not None or _left(ideal, last) > 1.02 * _left(ideal, before)
     # twice the vibration of an ideal chain at that time
     is_own = (is_clipped and is_unstable) or size > 2 * _left(ideal, last)
-    if size == 0.0 or size < CYCLE_LASTS * earlier or is_transient or not is_own:
+    if size == 0.0 or size < cycle_lasts * earlier or is_transient or not is_own:
         return None
     return LimitCycle(
         root_moment=size,
@@ -272,7 +354,9 @@ def simulate(
     algebraic loop, an unknown signal, a law in z whose period is not the chain's, and as `scenario` does.
     """
     case = Case(arm, law, chain)
-    return simulated_run(case, scenario_name, duration, count=count, between=between, outputs=outputs).simulation
+    return simulated_run(
+        case, scenario_name, duration, count=count, between=between, outputs=outputs
+    ).simulation
 
 
 def simulate_for_picture(case: Case, scenario_name: str, duration: float) -> Simulation:
@@ -315,5 +399,7 @@ def simulated_run(
     """
     task = scenario(name, case.arm, case.chain, duration)
     return Run(
-        case, *simulate_modes(case, task, count, between, outputs), describe_scenario(task, case.arm, case.chain)
+        case,
+        *simulate_modes(case, task, count, between, outputs),
+        describe_scenario(task, case.arm, case.chain),
     )

@@ -17,10 +17,12 @@ from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.gains import turning_inertia
 
-MOST_TASK_SAMPLES = 4_000_000  # of a record, a few hundred MB of signals
-TRIAL_COST = (1.0, 2.6)  # 1/(N m)^2 s: weights a and b of the paper's (23), of vibration and of the law's own share
-TRIAL_SLEWS = 3.0  # times the slew: length of a trial for an arm and its chain
-TRIAL_DURATION = 3.0  # s, of a trial or a simulation by default: three times the paper's slew
+# 1/(N m)^2 s: weights a and b of the paper's (23), of vibration and of the law's own share
+TRIAL_COST = (1.0, 2.6)
+# times the slew: length of a trial for an arm and its chain
+TRIAL_SLEWS = 3.0
+# s, of a trial or a simulation by default: three times the paper's slew
+TRIAL_DURATION = 3.0
 SCENARIOS = ("slew", "step", "decay", "impulse", "pulse")
 
 
@@ -161,14 +163,20 @@ def describe_scenario(task: Scenario, arm: Arm, chain: Chain) -> str:
 def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
     """Return the scenario of that name with its usual size.  Raises ParameterError for an unknown one."""
     must_be_known("scenario", name, SCENARIOS)
-    return slew_scenario(arm, chain, duration) if name == "slew" else rest_scenario(name, arm, chain, duration)
+    return (
+        slew_scenario(arm, chain, duration) if name == "slew" else rest_scenario(name, arm, chain, duration)
+    )
 
 
 def _samples(duration: float, period: float) -> int:
     """Number of samples in 0 .. duration, both ends included."""
+    # of a record, a few hundred MB of signals
+    most_task_samples = 4_000_000
     length = positive("duration", duration, "a duration is a positive, finite number of seconds")
     require(
-        length / period < MOST_TASK_SAMPLES, "duration", length,
-        f"at most {MOST_TASK_SAMPLES} samples of {period:g} s; a shorter one, or a longer period",
-    )  # fmt: skip
+        length / period < most_task_samples,
+        "duration",
+        length,
+        f"at most {most_task_samples} samples of {period:g} s; a shorter one, or a longer period",
+    )
     return math.floor(length / period * (1 + TIME_ROUNDING)) + 1

@@ -34,11 +34,15 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 
-FOLDED_UP = 10.0  # rad: the simulation stops at the root moment EI/L times this, far beyond small deflections
-MOST_BETWEEN = 1000  # records between two samples
+# rad: the simulation stops at the root moment EI/L times this, far beyond small deflections
+FOLDED_UP = 10.0
+# records between two samples
+MOST_BETWEEN = 1000
 RESIDUAL = "residual root moment after the slew"
-SETTLING_BAND = 0.02  # of the travel, within which a signal has settled: as in python-control and MATLAB
-LEFT_OF_RECORD = 10  # a tenth of a record has to follow a settling time
+# of the travel, within which a signal has settled: as in python-control and MATLAB
+SETTLING_BAND = 0.02
+# a tenth of a record has to follow a settling time
+LEFT_OF_RECORD = 10
 
 
 def quantisers(chain: Chain) -> Real:
@@ -50,7 +54,9 @@ def quantisers(chain: Chain) -> Real:
     limit = chain.actuator.torque_limit
     encoder = [2 * math.pi / of.encoder_counts if of.encoder_counts else 0.0, -math.inf, math.inf]
     step, low, high = _converter(of.torque_bits, of.torque_range)
-    return np.array([encoder, _converter(of.moment_bits, of.moment_range), [step, max(low, -limit), min(high, limit)]])
+    return np.array(
+        [encoder, _converter(of.moment_bits, of.moment_range), [step, max(low, -limit), min(high, limit)]]
+    )
 
 
 def final_value(t: Real, y: Real) -> float:
@@ -131,7 +137,9 @@ class Trace:
         return {"t": self.t} | {name: self.signal(name) for name in self.names}
 
     @property
-    def units(self) -> Annotated[dict[str, str], Quantity(key="outputs", help="SI unit of each further output")]:
+    def units(
+        self,
+    ) -> Annotated[dict[str, str], Quantity(key="outputs", help="SI unit of each further output")]:
         """The SI units of the further outputs."""
         return {name: OUTPUTS[name.partition("@")[0]].unit for name in self.others}
 
@@ -170,37 +178,75 @@ class Simulation:
     gain: Real | None
     saturated_at: NDArray[np.bool_]
     rings: tuple[Real, Real]
-    energy_error: Annotated[float | None, Quantity(
-            help="energy gained less work done, over initial energy and work, without damping")]  # fmt: skip
+    energy_error: Annotated[
+        float | None,
+        Quantity(help="energy gained less work done, over initial energy and work, without damping"),
+    ]
     stopped: Stop | None
 
     @property
-    def residual_moment(self) -> Annotated[float | None, Quantity(
-            f"{RESIDUAL} less the rigid arm's", "N m rms", key="residual_moment_rms",
-            help="rms of the vibration from the end of the slew to the end of the record")]:  # fmt: skip
+    def residual_moment(
+        self,
+    ) -> Annotated[
+        float | None,
+        Quantity(
+            f"{RESIDUAL} less the rigid arm's",
+            "N m rms",
+            key="residual_moment_rms",
+            help="rms of the vibration from the end of the slew to the end of the record",
+        ),
+    ]:
         """The residual; None where the run stopped, or its record ends before the slew."""
         return self.scenario.residual_rms(self.at_samples.root_moment)
 
     @property
-    def residual_raw(self) -> Annotated[float | None, Quantity(RESIDUAL, "N m rms", key="residual_raw_moment_rms",
-            help="rms of the root moment from the end of the slew to the end of the record")]:  # fmt: skip
+    def residual_raw(
+        self,
+    ) -> Annotated[
+        float | None,
+        Quantity(
+            RESIDUAL,
+            "N m rms",
+            key="residual_raw_moment_rms",
+            help="rms of the root moment from the end of the slew to the end of the record",
+        ),
+    ]:
         """The same of the root moment itself; its first sample is one of the slew's last torque."""
         rigid = replace(self.scenario, rigid_moment=0 * self.scenario.rigid_moment)
         return rigid.residual_rms(self.at_samples.root_moment)
 
     @property
-    def settling_time(self) -> Annotated[float | None, Quantity("settling time (2 %)", "s", 4,
+    def settling_time(
+        self,
+    ) -> Annotated[
+        float | None,
+        Quantity(
+            "settling time (2 %)",
+            "s",
+            4,
             help="time from the end of the motion after which the root moment stays within 2 % of its largest "
-            "deviation from its final value")]:  # fmt: skip
+            "deviation from its final value",
+        ),
+    ]:
         """None where the simulation stopped, or less than a tenth of the record is left to show it."""
         moment = self.at_samples.root_moment
         if self.stopped or not moment.size:
             return None
-        return settling_time(self.t, abs(moment - final_value(self.t, moment)), moves_until=self.scenario.busy_until)
+        return settling_time(
+            self.t, abs(moment - final_value(self.t, moment)), moves_until=self.scenario.busy_until
+        )
 
     @property
-    def saturated(self) -> Annotated[dict[str, int], Quantity("saturated samples", key="saturated_samples",
-            help="samples at which encoder, strain amplifier and torque were clipped")]:  # fmt: skip
+    def saturated(
+        self,
+    ) -> Annotated[
+        dict[str, int],
+        Quantity(
+            "saturated samples",
+            key="saturated_samples",
+            help="samples at which encoder, strain amplifier and torque were clipped",
+        ),
+    ]:
         """Numbers of samples at which encoder, strain amplifier and torque were clipped."""
         return dict(zip(("encoder", "moment", "torque"), self.saturated_at.sum(axis=0).tolist(), strict=True))
 
@@ -210,7 +256,11 @@ class Simulation:
         end = float(self.t.max(initial=0.0))
         moment = float(abs(self.at_samples.root_moment).max(initial=0.0))
         clipped = [f"{name} clipped at {n} samples" for name, n in self.saturated.items() if n]
-        ran = f"ran to {end:.6g} s" if self.stopped is None else f"unstable, stopped at {self.stopped.time:.6g} s"
+        ran = (
+            f"ran to {end:.6g} s"
+            if self.stopped is None
+            else f"unstable, stopped at {self.stopped.time:.6g} s"
+        )
         return ", ".join([ran, f"root moment up to {moment:.4g} N m", *clipped])
 
     @property
@@ -251,7 +301,8 @@ class Simulator:
         self.case = case
         self.gains = case.gains if case.in_computer.references == AT_HUB else None
         self.law, self.chain = acting_law(case)
-        references_of(self.law, scenario)  # raises for one that is missing
+        # raises for one that is missing
+        references_of(self.law, scenario)
         self.scenario = scenario
         self.between = between
         self.others = tuple(dict.fromkeys(name for name in outputs if name not in RECORDED))
@@ -297,7 +348,9 @@ class Simulator:
         sources = np.array([self.measured.index(name) if name in self.measured else -1 for name in columns])
         references = references_of(law, self.scenario)
         state = self._start()
-        done = kernel.run_samples(self.model, state, self._forcing, self.electronics, table, sources, references)
+        done = kernel.run_samples(
+            self.model, state, self._forcing, self.electronics, table, sources, references
+        )
         return self._result(state, int(done), None if gains is None else np.full(state.torque.size, gains.K2))
 
     def controller(self, controller: ControlFunction) -> Simulation:
@@ -393,8 +446,12 @@ class Simulator:
         stopped = None
         error = None
         if done < state.torque.size:
-            of_root = np.nan_to_num(abs(self.plant.residues[kernel.MOMENT, self.kept] * state.amplitude), nan=np.inf)
-            stopped = Stop(done * self.scenario.period, int(self.plant.mode[self.kept][int(np.argmax(of_root))]))
+            of_root = np.nan_to_num(
+                abs(self.plant.residues[kernel.MOMENT, self.kept] * state.amplitude), nan=np.inf
+            )
+            stopped = Stop(
+                done * self.scenario.period, int(self.plant.mode[self.kept][int(np.argmax(of_root))])
+            )
         elif self.plant.arm.is_undamped and not self.chain.actuator.hub_damping > 0:
             before = self._energy(self._first[self.kept] + self.scenario.impulse, self.scenario.impulse)
             after = self._energy(state.amplitude, state.rigid[kernel.ONCE])

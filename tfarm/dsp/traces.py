@@ -28,14 +28,22 @@ from tfarm.records import frozen
 from tfarm.schema import Column
 from tfarm.spectrum import modes
 
-POINTS_A_PERIOD = 20  # of a curve in each period of the fastest visible mode
-VISIBLE = 1 / 300  # of the height of a curve: a pixel of a picture
-LEAST_BETWEEN = 3  # records between two samples at least
-MOST_LINE = 6000  # points of a line: at 20 a period still three pixels a period
-PERIODS = 2  # of the fastest mode that each piece of a band holds at least
-RECORD_LENGTH = 3.0  # times the slew: length of a record
-RATE = 20  # frames a second
-MOST_FRAMES = 240  # of a film
+# of a curve in each period of the fastest visible mode
+POINTS_A_PERIOD = 20
+# of the height of a curve: a pixel of a picture
+VISIBLE = 1 / 300
+# records between two samples at least
+LEAST_BETWEEN = 3
+# points of a line: at 20 a period still three pixels a period
+MOST_LINE = 6000
+# of the fastest mode that each piece of a band holds at least
+PERIODS = 2
+# times the slew: length of a record
+RECORD_LENGTH = 3.0
+# frames a second
+RATE = 20
+# of a film
+MOST_FRAMES = 240
 
 
 def records_between(arm: Arm, run: Simulation) -> int:
@@ -73,7 +81,9 @@ class TimeCurve:
         return Column(f"{name}_low", of=self.low), Column(f"{name}_high", of=self.high)
 
 
-def resolve_simulations(simulator: Simulator, arm: Arm, *runs: Callable[[Simulator], Simulation]) -> list[Simulation]:
+def resolve_simulations(
+    simulator: Simulator, arm: Arm, *runs: Callable[[Simulator], Simulation]
+) -> list[Simulation]:
     """Return the simulations of one picture, with enough records between their samples for its fastest visible mode."""
     needed = max(records_between(arm, run(simulator)) for run in runs)
     # some 30 MB of records

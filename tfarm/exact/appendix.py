@@ -19,14 +19,13 @@ from mpmath import mp, mpc, mpf
 
 from tfarm.arm import Arm
 from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.exact.outputs import Output, output
+from tfarm.exact.series import constant_of
+from tfarm.exact.system import system_of
+from tfarm.exact.waves import Number
 
-from .outputs import Output, output
-from .series import constant_of
-from .system import system_of
-from .waves import Number
-
-FEWEST_DIGITS = 15  # of agreement, beyond coincidence
-MOST_DIGITS = 10_000  # of working precision
+# of agreement, beyond coincidence
+FEWEST_DIGITS = 15
 
 
 class Appendix:
@@ -43,7 +42,8 @@ class Appendix:
         self.kappa_G = mpf(link.shear_factor) * mpf(link.shear_modulus)
         self.EI = mpf(link.youngs_modulus) * mpf(link.section.second_moment)
         self.s, self.damper = s, 1 + mpf(link.damping) * s
-        inertias = (payload.mass, payload.inertia, arm.hub.inertia)  # of each row the weights of motion and force
+        # of each row the weights of motion and force
+        inertias = (payload.mass, payload.inertia, arm.hub.inertia)
         self.ends = [(mpf(1), mpf(0)) if math.isinf(each) else (each * s**2, mpf(1)) for each in inertias]
         lambda_1, lambda_2 = self.wave_numbers(mpf(link.youngs_modulus) * self.damper)
         self.lambdas = (lambda_1, lambda_2, -lambda_1, -lambda_2)
@@ -127,7 +127,9 @@ def determinant(arm: Arm, s: complex, digits: int) -> Number:
     try:
         return _agreed(lambda: [Appendix(arm, mpc(s)).Delta], digits, f"Delta at s = {s}")[0]
     except ZeroDivisionError:
-        raise ConvergenceError(f"Delta has no value at s = {s}, where a wave number is zero", None, None) from None
+        raise ConvergenceError(
+            f"Delta has no value at s = {s}, where a wave number is zero", None, None
+        ) from None
 
 
 def output_value(arm: Arm, name: str | Output, s: complex, digits: int, x: float | None = None) -> Number:
@@ -140,12 +142,16 @@ def output_value(arm: Arm, name: str | Output, s: complex, digits: int, x: float
     wanted = output(name)
     place = {"root": 0.0, "tip": arm.link.length, "x": x}[wanted.place]
     if place is None or not 0.0 <= place <= arm.link.length:
-        raise ParameterError(key="x", value=x, remedy=f"a point of the arm lies between 0 and {arm.link.length} m")
+        raise ParameterError(
+            key="x", value=x, remedy=f"a point of the arm lies between 0 and {arm.link.length} m"
+        )
     constant = constant_of(system_of(arm), wanted, place / arm.link.length)
-    if constant == 0:  # by an end condition: no digits would agree
+    # by an end condition: no digits would agree
+    if constant == 0:
         return mpf(0)
     is_damped = wanted.gauge and arm.link.damping
-    on_axis = s.real == 0 and arm.link.damping == 0  # there the output over s^power is real, as for real s
+    # there the output over s^power is real, as for real s
+    on_axis = s.real == 0 and arm.link.damping == 0
     is_real = s.imag == 0 or on_axis or (constant is not None and not is_damped)
 
     def parts() -> list[Number]:
@@ -178,7 +184,11 @@ def roots_near(arm: Arm, omega: float | str | Number, digits: int) -> int:
     undamped = arm.having(damping=0.0)
     with mpmath.workdps(2 * digits + FEWEST_DIGITS):
         half_circle = [mpf(omega) * (1 + mpmath.expjpi(mpf(n) / 8) / mpf(10) ** digits) for n in range(9)]
-    values = [_agreed(lambda w=w: [_smooth(undamped, w)], FEWEST_DIGITS, f"Delta at {w}")[0] for w in half_circle]  # type: ignore[misc]
+
+    def delta(w: Number) -> Number:
+        return _agreed(lambda: [_smooth(undamped, w)], FEWEST_DIGITS, f"Delta at {w}")[0]
+
+    values = [delta(w) for w in half_circle]
     turns = [float(mpmath.arg(after / before)) for before, after in pairwise(values)]
     return round(sum(turns) / math.pi)
 
@@ -193,8 +203,13 @@ def natural_frequency(arm: Arm, near: float, digits: int) -> Number:
     def root() -> list[Number]:
         ends = mpf(near), mpf(near) * (1 + mpf(10) ** -8)
         try:
-            return [mpmath.findroot(lambda w: _smooth(undamped, w).real, ends, solver="secant", tol=0, verify=False)]
-        except ZeroDivisionError:  # both ends are the root, to the last digit
+            return [
+                mpmath.findroot(
+                    lambda w: _smooth(undamped, w).real, ends, solver="secant", tol=0, verify=False
+                )
+            ]
+        except ZeroDivisionError:
+            # both ends are the root, to the last digit
             return [ends[0]]
 
     return _agreed(root, digits, f"the root of Delta near {near} rad/s")[0]
@@ -202,11 +217,13 @@ def natural_frequency(arm: Arm, near: float, digits: int) -> Number:
 
 def _agreed(evaluate: Callable[[], list[Number]], digits: int, what: str) -> list[Number]:
     """Return evaluate() at a working precision doubled until two results agree, each number to its digits."""
+    # of working precision
+    most_digits = 10_000
     digits = max(digits, FEWEST_DIGITS)
     work = digits + FEWEST_DIGITS
     last = [mpf(0)]
     misses = [mpf(0)]
-    while work < MOST_DIGITS + 4 * digits:
+    while work < most_digits + 4 * digits:
         with mpmath.workdps(work):
             values = evaluate()
             misses = [abs(value - before) for value, before in zip(values, last, strict=False)]
@@ -220,5 +237,7 @@ def _agreed(evaluate: Callable[[], list[Number]], digits: int, what: str) -> lis
 def _determinant(a: list[list[Number]]) -> Number:
     """Return a determinant by Laplace's expansion in 2x2 minors, as mpmath's fails for a badly scaled matrix."""
     pairs = list(combinations(range(4), 2))
-    upper, lower = ([row[i] * next_[j] - row[j] * next_[i] for i, j in pairs] for row, next_ in (a[:2], a[2:]))
+    upper, lower = (
+        [row[i] * next_[j] - row[j] * next_[i] for i, j in pairs] for row, next_ in (a[:2], a[2:])
+    )
     return sum(sign * m * n for sign, m, n in zip((1, -1, 1, 1, -1, 1), upper, reversed(lower), strict=True))

@@ -14,26 +14,32 @@ from typing import Any, TypeVar
 
 import flint
 
-from . import sweep, waves
-from .compiled import python_of
-from .layout import KINDS, Layout, OutputFormula
-from .system import Mark, Place, Segment
-from .waves import SolutionPlane, SolutionRow
+from tfarm.exact import sweep, waves
+from tfarm.exact.compiled import python_of
+from tfarm.exact.layout import KINDS, Layout, OutputFormula
+from tfarm.exact.system import Mark, Place, Segment
+from tfarm.exact.waves import SolutionPlane, SolutionRow
 
 _end_plane, _met, _across_rows, _row_across = map(
     python_of, (waves.end_plane, waves.met, waves.across_rows, waves.row_across)
 )
-_transition_rows, across_waves, in_chain = map(python_of, (waves.transition_rows, waves.across_waves, waves.in_chain))
+_transition_rows, across_waves, in_chain = map(
+    python_of, (waves.transition_rows, waves.across_waves, waves.in_chain)
+)
 _inside_element = python_of(sweep.inside)
 _beyond_element = python_of(sweep.carry_beyond)
-Ball = Any  # flint.acb or flint.arb, which come without types
+# flint.acb or flint.arb, which come without types
+Ball = Any
 _Enclosure = TypeVar("_Enclosure")
 
 
-precision = flint.ctx.workprec  # flint's working precision [bits], inside a `with` block
+# flint's working precision [bits], inside a `with` block
+precision = flint.ctx.workprec
 
 
-def first_success(bits: Iterable[int], attempt: Callable[[], _Enclosure | None], failure: Exception) -> _Enclosure:
+def first_success(
+    bits: Iterable[int], attempt: Callable[[], _Enclosure | None], failure: Exception
+) -> _Enclosure:
     """Return the first result other than None of attempts at working precisions [bits].  Raises `failure` else."""
     for working in bits:
         with precision(working):
@@ -78,7 +84,12 @@ def transition(z_sum: Ball, z_product: Ball) -> tuple[Ball, ...]:
     (h1, c1) = t1.sinh_cosh()
     (h2, c2) = t2.sinh_cosh()
     over = 1 / (z1 - z2)
-    return (h1 / t1 - h2 / t2) * over, (c1 - c2) * over, (t1 * h1 - t2 * h2) * over, (z1 * c1 - z2 * c2) * over
+    return (
+        (h1 / t1 - h2 / t2) * over,
+        (c1 - c2) * over,
+        (t1 * h1 - t2 * h2) * over,
+        (z1 * c1 - z2 * c2) * over,
+    )
 
 
 def nearest_float(ball: Ball) -> complex:

@@ -33,17 +33,16 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Law
 from tfarm.arrays import Complex, Real
+from tfarm.exact.balls import Ball, Sweep, across_waves, in_chain, point, rational, sum_series
+from tfarm.exact.layout import Layout, laid_out, readings
+from tfarm.exact.outputs import Output
+from tfarm.exact.rationals import polynomials
+from tfarm.exact.system import Place, Segment, System
+from tfarm.exact.values import free_of, free_slopes
+from tfarm.exact.waves import SolutionPlane, SolutionRow
 
-from .balls import Ball, Sweep, across_waves, in_chain, point, rational, sum_series
-from .layout import Layout, laid_out, readings
-from .outputs import Output
-from .rationals import polynomials
-from .system import Place, Segment, System
-from .values import free_of, free_slopes
-from .waves import SolutionPlane, SolutionRow
-
-NEXT_TO_REST = 1e-60  # 1/s, for s = 0: there D over a power of s is at its limit, and no power is 0
-DIFFERENCE_STEP = 1e-6  # of |s|, or of the way to -1/C, for differences
+# of |s|, or of the way to -1/C, for differences
+DIFFERENCE_STEP = 1e-6
 
 
 class Analytic(NamedTuple):
@@ -71,7 +70,9 @@ def characteristic(k: System, s: Complex, at_zero: int = 0) -> Analytic:
 
 def off_rest(s: Complex) -> Complex:
     """Return s with 0 replaced by a tiny number, for a division by a power of s."""
-    return np.where(s == 0, NEXT_TO_REST, s)
+    # 1/s, for s = 0: there D over a power of s is at its limit, and no power is 0
+    next_to_rest = 1e-60
+    return np.where(s == 0, next_to_rest, s)
 
 
 def deflate(value: Complex, slope: Complex, scale: Complex, s: Complex, at_zero: int) -> Analytic:
@@ -112,10 +113,10 @@ def difference_steps(k: System, s: Complex) -> Real:
     return np.asarray(DIFFERENCE_STEP * np.maximum(abs(s) * near, 1e-300))
 
 
-Polynomial = Any  # flint.fmpq_poly, which comes without types
-Series = Any  # flint.acb_series, which comes without types
-
-LONG_WAVE = 0.3  # |z| below which a wave is not separated from the others
+# flint.fmpq_poly, which comes without types
+Polynomial = Any
+# flint.acb_series, which comes without types
+Series = Any
 
 
 class InseparableError(Exception):
@@ -168,7 +169,8 @@ class WideSweep(Sweep):
         # 40 of them at least: up to twice that argument the tail is below 1e-60; two more for each wave
         count = 40 + 2 * math.isqrt(int(float(q)))
         tail = (count + 1) * q**count * rational(Fraction(2, math.factorial(2 * count)))
-        if not q < count**2:  # each term is less than half of the one before
+        # each term is less than half of the one before
+        if not q < count**2:
             raise InseparableError
         ball = flint.acb(flint.arb(0, tail.upper()), flint.arb(0, tail.upper()))
         terms_kept = z_sum.prec
@@ -197,12 +199,14 @@ def characteristic_ball(k: System, s: Ball, law: Feedback | None = None) -> Ball
 
 def characteristic_over(k: System, s: Ball, law: Feedback | None = None) -> Ball:
     """Return D enclosed over the wide ball s, up to a positive factor that depends on its middle alone."""
+    # |z| below which a wave is not separated from the others
+    long_wave = 0.3
     # the power of the last Taylor term, the one over the wide ball
     middle = s.mid()
     last = 0 if s.real.is_exact() and s.imag.is_exact() else 3
     try:
-        here, scale = _by_waves(k, middle, law, None, LONG_WAVE, max(last, 1))
-        value = _by_waves(k, s, law, scale, LONG_WAVE, last + 1)[0][last] if last else here[0]
+        here, scale = _by_waves(k, middle, law, None, long_wave, max(last, 1))
+        value = _by_waves(k, s, law, scale, long_wave, last + 1)[0][last] if last else here[0]
     except InseparableError:
         return characteristic_ball(k, s, law)
     for order in reversed(range(last)):
@@ -262,7 +266,9 @@ def feedback(k: System, law: Law, outputs: Sequence[Output], shares: Sequence[fl
                 entries[name] += num * others
     used = [n for n, each in enumerate(entries.values()) if each]
     read = laid_out(k, [outputs[n] for n in used], [shares[n] for n in used])
-    return Feedback(read, _product(den for _, den in blocks), tuple(filter(None, entries.values())), law.delay)
+    return Feedback(
+        read, _product(den for _, den in blocks), tuple(filter(None, entries.values())), law.delay
+    )
 
 
 def _product(factors: Iterable[Polynomial]) -> Polynomial:
@@ -294,13 +300,15 @@ def _root(z: Series) -> Series:
 
 def _wave(z: Series, S: Series, d: Series, a: Ball, b: Ball, g: Ball, shortest: float) -> tuple[Series, ...]:
     """Return c, s, z, v, e and t of one wave for `across_waves`, scaled by e^{-t}.  Raises InseparableError."""
-    if not abs(z[0]).mid() > shortest:  # too long
+    # too long
+    if not abs(z[0]).mid() > shortest:
         raise InseparableError
     t = _nonzero(_root(z))
     e = (-t).exp()
     v = z - S * b
     inverse = d * z - S * a
     if not inverse[0].contains(0):
-        other = -(S * g) / inverse  # the same by the dispersion relation; the narrower of the two
+        # the same by the dispersion relation; the narrower of the two
+        other = -(S * g) / inverse
         v = other if other[0].rel_accuracy_bits() > v[0].rel_accuracy_bits() else v
     return (e * e + 1) / 2, (-(e * e) + 1) / (t * 2), z, v, e, t

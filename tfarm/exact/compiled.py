@@ -55,7 +55,8 @@ def compiled(function: _Kernel) -> _Kernel:
 def inlined(function: _Kernel) -> _Kernel:
     """Return a function compiled and inlined into the kernels that call it, so that loops over it vectorise."""
     kernel = _without_literals(njit(forceinline=True, no_cpython_wrapper=True, **OPTIONS)(function))
-    kernel._insert = lambda *_: None  # what Python would call: a null pointer
+    # what Python would call: a null pointer
+    kernel._insert = lambda *_: None
     kernel._compile_for_args = _refuse
     return kernel
 
@@ -74,7 +75,9 @@ def _without_literals(kernel: Any) -> Any:
 def python_of(function: Any) -> Callable[..., Any]:
     """Return the Python function of a compiled one, with its callees, for numbers other than numba's."""
     python: Any = getattr(function, "py_func", function)
-    called = {name: python.__globals__[name] for name in python.__code__.co_names if name in python.__globals__}
+    called = {
+        name: python.__globals__[name] for name in python.__code__.co_names if name in python.__globals__
+    }
     replaced = {name: python_of(value) for name, value in called.items() if hasattr(value, "py_func")}
     if not replaced:
         return python

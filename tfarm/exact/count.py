@@ -16,18 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arrays import Real
-from tfarm.records import read_only
-
-from .compiled import compiled, inlined
-from .layout import (
-    OF_ANGLE,
-    OF_MOMENT,
-    SEGMENT,
-    SPRING,
-    Layout,
-)
-from .sweep import inside
-from .waves import (
+from tfarm.exact.compiled import compiled, inlined
+from tfarm.exact.layout import OF_ANGLE, OF_MOMENT, SEGMENT, SPRING, Layout
+from tfarm.exact.sweep import inside
+from tfarm.exact.waves import (
     SERIES_RADIUS,
     SolutionPlane,
     Wave,
@@ -42,9 +34,10 @@ from .waves import (
     transition_rows,
     transition_series,
 )
+from tfarm.records import read_only
 
-DOUBLINGS = 40  # of the estimate of a slender beam, a factor of 1e12: the end of a search
-FREE_MOTIONS = 12  # in the vector of ends: the number of free motions of the tip
+# of the estimate of a slender beam, a factor of 1e12: the end of a search
+DOUBLINGS = 40
 
 
 def rows_to_count(layout: Layout) -> tuple[NDArray[np.void], Real]:
@@ -61,10 +54,12 @@ def _clamped(number: int, value: float, step: int) -> int:
 @inlined
 def chain_count(omega: float, rows: Any, ends: Any) -> int:
     """Return the number of natural frequencies below omega [rad/s], with the rigid body."""
+    # in the vector of ends: the number of free motions of the tip
+    free_motions = 12
     S = -omega * omega
     p = end_plane(*tip_conditions(ends, S))
     number = 0
-    free = int(ends[FREE_MOTIONS])
+    free = int(ends[free_motions])
     for i in range(len(rows)):
         row = rows[i]
         if row.kind == SEGMENT:
@@ -81,12 +76,15 @@ def chain_count(omega: float, rows: Any, ends: Any) -> int:
 
 
 @inlined
-def _joined(outside: int, omega: float, row: Any, plane: SolutionPlane, free: int) -> tuple[int, SolutionPlane]:
+def _joined(
+    outside: int, omega: float, row: Any, plane: SolutionPlane, free: int
+) -> tuple[int, SolutionPlane]:
     """Return the count with one more segment, clamped at its inner end, and the plane carried across it.
 
     `outside` is the count of the outer part clamped at the joint, `free` the number of free motions there.
     """
-    clamped = (0.0, 0.0, 0.0, 0.0, 1.0)  # W = Psi = 0
+    # W = Psi = 0
+    clamped = (0.0, 0.0, 0.0, 0.0, 1.0)
     (s, _, _), (z1, v1, t1, dt1), (z2, v2, t2, dt2) = dispersion(complex(0.0, omega), row)
     number = half_waves(z1, t1, dt1) + half_waves(z2, t2, dt2) + (z1.real < 0.0 and z2.real < 0.0)
     S = s.real
@@ -107,7 +105,8 @@ def _joined(outside: int, omega: float, row: Any, plane: SolutionPlane, free: in
         unit = 1.0 / (gS * EI * gap * gap)
         q = scale_plane(across_waves(one, two, gS, EI, plane), unit)
         r = scale_plane(across_waves(one, two, gS, EI, clamped), unit)
-    number = _clamped(number, r[1], -1)  # r at the outer end is, up to signs, the plane carried inwards (symmetry)
+    # r at the outer end is, up to signs, the plane carried inwards (symmetry)
+    number = _clamped(number, r[1], -1)
     number = _clamped(number, -r[0], -1) + outside
     if free == 2:
         number = _clamped(number, -r[0] * plane[3] - r[3] * plane[0], 1)
@@ -155,7 +154,11 @@ def list_steps(first: Any, last: int, rows: Any, starts: Any, ends: Any, estimat
 @inlined
 def half_waves(z: complex, t: complex, dt: complex) -> int:
     """Return the number of n with n pi < k, for a travelling wave e^{i k x}."""
-    return max(0, math.ceil((abs(t.imag) + math.copysign(1.0, t.imag) * dt.imag) / math.pi) - 1) if z.real < 0.0 else 0
+    return (
+        max(0, math.ceil((abs(t.imag) + math.copysign(1.0, t.imag) * dt.imag) / math.pi) - 1)
+        if z.real < 0.0
+        else 0
+    )
 
 
 @inlined

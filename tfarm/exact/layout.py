@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 
 from tfarm.arrays import Real
 from tfarm.errors import require
-from tfarm.records import read_only
-
-from .outputs import Output
-from .system import (
+from tfarm.exact.outputs import Output
+from tfarm.exact.system import (
     INNER,
     ONE,
     OUTER,
@@ -31,19 +29,25 @@ from .system import (
     elements_with_places,
     end_condition,
 )
+from tfarm.records import read_only
 
 SEGMENT, OFFSET, SPRING, BODY, MARK = range(5)
 KINDS: Mapping[type, int] = {Segment: SEGMENT, Offset: OFFSET, Spring: SPRING, Body: BODY, Mark: MARK}
 # A row of the kernel: kind and numbers of an element, with the names of its record; a, b, g are two doubles each.
-OF_ELEMENT = "kind a b g a_low b_low g_low sigma damping length stiffness compliance mass inertia rotational_stiffness"
+OF_ELEMENT = (
+    "kind a b g a_low b_low g_low sigma damping length stiffness compliance mass inertia rotational_stiffness"
+)
 ROW = np.dtype([*((name, float) for name in OF_ELEMENT.split()), ("of_chain", float, 4)])
-AT_JOINT = 2.0**-50  # of the length: rounding of a place at a joint, a quotient of float64 numbers
+# of the length: rounding of a place at a joint, a quotient of float64 numbers
+AT_JOINT = 2.0**-50
 # in the vector of ends: after six numbers of the payload A_0..A_3, then B_0 and B_1
 OF_ANGLE = 6
 OF_MOMENT = 10
 
-W, PSI, M, Q = range(4)  # the fields of a state
-FIELDS = {"W": W, "Y": W, "centre": W, "Psi": PSI, "Phi": PSI, "M": M, "strain": M, "Q": Q}  # of each quantity
+# the fields of a state
+W, PSI, M, Q = range(4)
+# of each quantity
+FIELDS = {"W": W, "Y": W, "centre": W, "Psi": PSI, "Phi": PSI, "M": M, "strain": M, "Q": Q}
 
 
 class OutputFormula(NamedTuple):
@@ -68,7 +72,9 @@ class Layout:
     `elements` run from the payload inwards.
     """
 
-    def __init__(self, chain: System, places: tuple[Place, ...] = (), each: tuple[OutputFormula, ...] = ()) -> None:
+    def __init__(
+        self, chain: System, places: tuple[Place, ...] = (), each: tuple[OutputFormula, ...] = ()
+    ) -> None:
         self.chain, self.places, self.each = chain, places, each
         elements = list(elements_with_places(chain.elements))
         joints = [position for position, _, each in elements if isinstance(each, Segment)] + [ZERO]
@@ -88,7 +94,9 @@ class Layout:
         """
         if key not in self._numbers:
             elements = [
-                each if isinstance(each, Mark) else type(each)._make(n if n is None else exact(n) for n in each)
+                each
+                if isinstance(each, Mark)
+                else type(each)._make(n if n is None else exact(n) for n in each)
                 for each in self.elements
             ]
             self._numbers[key] = [elements, *(tuple(map(exact, each)) for each in self._conditions)]
@@ -99,7 +107,12 @@ class Layout:
         """Both tip conditions, A_0..A_3, and B_0 and B_1."""
         chain = self.chain
         drive = self.chain.drive
-        return end_condition(chain.tip_mass), end_condition(chain.tip_inertia), drive.of_angle, drive.of_moment
+        return (
+            end_condition(chain.tip_mass),
+            end_condition(chain.tip_inertia),
+            drive.of_angle,
+            drive.of_moment,
+        )
 
     @cached_property
     def rows(self) -> NDArray[np.void]:
@@ -142,7 +155,9 @@ def segment_at(chain: System, place: Place) -> Segment:
     inner_end = ONE
     for each in chain.segments:
         inner_end -= each.length
-        if place.share > inner_end + AT_JOINT or (place.side == "outer" and place.share >= inner_end - AT_JOINT):
+        if place.share > inner_end + AT_JOINT or (
+            place.side == "outer" and place.share >= inner_end - AT_JOINT
+        ):
             break
     return each
 
@@ -158,10 +173,12 @@ def reading_of(chain: System, wanted: Output, x: float) -> OutputFormula:
     share = Fraction(wanted.share(x))
     drive = chain.drive
     unit = unit_scale(wanted, chain)
-    if wanted.quantity == "current":  # the torque, which is the input less back-EMF, through the lag
+    # the torque, which is the input less back-EMF, through the lag
+    if wanted.quantity == "current":
         is_driven = drive.per_ampere and drive.turns
         require(is_driven, "output", "motor_current", "needs a [motor] and another input than hub_angle")
-        amperes = chain.EI / chain.length / drive.per_ampere / drive.unit  # per dimensionless torque
+        # per dimensionless torque
+        amperes = chain.EI / chain.length / drive.per_ampere / drive.unit
         return OutputFormula(None, -1, ZERO, wanted.power, amperes, drive.lag, -drive.back_emf, 1)
     if wanted.quantity == "theta":
         return OutputFormula(None, -1, ONE, wanted.power, unit)
@@ -171,7 +188,8 @@ def reading_of(chain: System, wanted: Output, x: float) -> OutputFormula:
     elif wanted.place == "root" and wanted.gauge:
         place = chain.gauge
     segment = segment_at(chain, place)
-    if wanted.quantity == "strain":  # at the surface: half the depth over E I/L
+    # at the surface: half the depth over E I/L
+    if wanted.quantity == "strain":
         remedy = 'a "general" section has no depth: give rectangle, round or tube'
         require(segment.half_depth is not None, "link.section.shape", "general", remedy)
         unit = Fraction(segment.half_depth or 0) / chain.length / segment.stiffness / drive.unit

@@ -16,17 +16,17 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 from tfarm.errors import ParameterError, require
-
-from .balls import Ball, Sweep, point, rational
-from .compiled import python_of
-from .layout import Layout, M, OutputFormula, Q, reading_of
-from .outputs import Output
-from .system import Place, Spring, System
-from .values import PROVEN_BITS, accurate_ball, certify_by_precision
-from .waves import SolutionRow, met
+from tfarm.exact.balls import Ball, Sweep, point, rational
+from tfarm.exact.compiled import python_of
+from tfarm.exact.layout import Layout, M, OutputFormula, Q, reading_of
+from tfarm.exact.outputs import Output
+from tfarm.exact.system import Place, Spring, System
+from tfarm.exact.values import PROVEN_BITS, accurate_ball, certify_by_precision
+from tfarm.exact.waves import SolutionRow, met
 
 _met = python_of(met)
-LOAD_KINDS = {"force": ("N", Q, (1,)), "moment_pair": ("N m", M, (-1, 1))}  # unit, entry of the state, its jumps
+# unit, entry of the state, its jumps
+LOAD_KINDS = {"force": ("N", Q, (1,)), "moment_pair": ("N m", M, (-1, 1))}
 
 
 class Load(NamedTuple):
@@ -70,7 +70,8 @@ def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float
     one = reading_of(chain, wanted, x)
     (_, jump, signs) = LOAD_KINDS[load.kind]
     require(not one.input, "output", wanted.name, "needs an input at the hub instead of a load")
-    unit = (chain.length / chain.EI) * (chain.length if jump == Q else 1)  # of the dimensionless load
+    # of the dimensionless load
+    unit = (chain.length / chain.EI) * (chain.length if jump == Q else 1)
     loads = [Place(Fraction(share)) for share in load.shares]
     layouts = [Layout(chain, tuple(dict.fromkeys((at, one.place or at)))) for at in loads]
 
@@ -100,10 +101,12 @@ class _Loaded(Sweep):
         none = 0 * self.s
         whole = 1 + 0 * self.s
         f, g = (
-            self.carried_out(at) for at in ((whole, none, none, none), (none, self.of_angle, -self.of_moment, none))
+            self.carried_out(at)
+            for at in ((whole, none, none, none), (none, self.of_angle, -self.of_moment, none))
         )
         F, G = ({at: _met(row, self.planes[at]) for at, row in rows.items()} for rows in (f, g))
-        balance = {at: sum(a * b for a, b in zip(g[at], F[at], strict=True)) for at in f}  # 0 at an eigenvalue
+        # 0 at an eigenvalue
+        balance = {at: sum(a * b for a, b in zip(g[at], F[at], strict=True)) for at in f}
         # w(F, e) and w(G, e)
         by_F = F[load][Q - jump] / balance[load]
         by_G = G[load][Q - jump] / balance[load]

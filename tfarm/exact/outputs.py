@@ -21,22 +21,24 @@ from tfarm.errors import must_be_known, require
 # bending strain at the surface, displacement of the payload's centre of mass, current of the motor
 OutputQuantity = Literal["theta", "M", "Q", "W", "Y", "Phi", "Psi", "strain", "centre", "current"]
 OutputPlace = Literal["root", "tip", "x"]
-Side = Literal["outer", "inner"]  # of a joint of two segments, or of an attachment
+# of a joint of two segments, or of an attachment
+Side = Literal["outer", "inner"]
 
-MOST_POWER = 4  # of s: rate, acceleration, jerk and its rate
 # SI unit of each quantity, and the places where it is known
-QUANTITIES: Mapping[str, tuple[str, ...]] = MappingProxyType({
-    "theta": ("rad", "root"),
-    "M": ("N m", "root", "tip", "x"),
-    "Q": ("N", "root", "tip", "x"),
-    "W": ("m", "tip", "x"),
-    "Y": ("m", "tip", "x"),
-    "Phi": ("rad", "tip", "x"),
-    "Psi": ("rad", "tip", "x"),
-    "strain": ("1", "x"),
-    "centre": ("m", "tip"),
-    "current": ("A", "root"),
-})  # fmt: skip
+QUANTITIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "theta": ("rad", "root"),
+        "M": ("N m", "root", "tip", "x"),
+        "Q": ("N", "root", "tip", "x"),
+        "W": ("m", "tip", "x"),
+        "Y": ("m", "tip", "x"),
+        "Phi": ("rad", "tip", "x"),
+        "Psi": ("rad", "tip", "x"),
+        "strain": ("1", "x"),
+        "centre": ("m", "tip"),
+        "current": ("A", "root"),
+    }
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,6 +60,8 @@ class Output:
     name: str = ""
 
     def __post_init__(self) -> None:
+        # of s: rate, acceleration, jerk and its rate
+        most_power = 4
         has_word = isinstance(self.label, str) and re.search(r"\w", self.label)
         require(has_word, "output.label", self.label, "a text with a word")
         if not self.name:
@@ -66,8 +70,15 @@ class Output:
         require(is_name, "output.name", self.name, "letters, digits and underscores")
         must_be_known("output.quantity", self.quantity, QUANTITIES)
         unit, *places = QUANTITIES[self.quantity]
-        require(self.place in places, "output.place", self.place, f"{self.quantity} is known at: {', '.join(places)}")
-        whole("output.power", self.power, 0, MOST_POWER, f"a power of s: a whole number from 0 to {MOST_POWER}")
+        require(
+            self.place in places,
+            "output.place",
+            self.place,
+            f"{self.quantity} is known at: {', '.join(places)}",
+        )
+        whole(
+            "output.power", self.power, 0, most_power, f"a power of s: a whole number from 0 to {most_power}"
+        )
         is_gauge = isinstance(self.gauge, bool) and (not self.gauge or self.quantity in ("M", "strain"))
         remedy = "true or false, true for a moment only: a strain gauge measures E I phi' without its damping"
         require(is_gauge, "output.gauge", self.gauge, remedy)
@@ -79,7 +90,9 @@ class Output:
     def is_in_appendix(self) -> bool:
         """Whether the paper's appendix has it."""
         along = self.quantity == "W" and self.place == "x"
-        return not along and self.quantity not in ("Psi", "strain", "centre", "current") and self.side == "outer"
+        return (
+            not along and self.quantity not in ("Psi", "strain", "centre", "current") and self.side == "outer"
+        )
 
     @property
     def base(self) -> Output:
@@ -91,28 +104,33 @@ class Output:
         return {"root": 0.0, "tip": 1.0, "x": x}[self.place]
 
 
-OUTPUTS: Mapping[str, Output] = MappingProxyType({each.name: each for each in (
-    Output(quantity="theta", place="root", label="hub angle"),
-    Output(quantity="theta", place="root", power=1, label="hub rate"),
-    Output(quantity="W", place="tip", label="tip displacement"),
-    Output(quantity="Y", place="tip", label="tip deflection"),
-    Output(quantity="W", place="tip", power=2, label="tip acceleration"),
-    Output(quantity="M", place="root", gauge=True, label="root moment"),
-    Output(name="root_shear", quantity="Q", place="root", label="root shear force"),
-    Output(quantity="current", place="root", label="motor current"),
-    Output(quantity="Phi", place="tip", label="tip rotation"),
-    Output(name="tip_angle", quantity="Psi", place="tip", label="tip angle in space"),
-    Output(quantity="centre", place="tip", label="payload displacement"),
-    Output(name="displacement", quantity="W", place="x", label="displacement at x"),
-    Output(name="velocity", quantity="W", place="x", power=1, label="velocity at x"),
-    Output(name="acceleration", quantity="W", place="x", power=2, label="acceleration at x"),
-    Output(name="deflection", quantity="Y", place="x", label="deflection at x"),
-    Output(name="rotation", quantity="Phi", place="x", label="rotation at x"),
-    Output(name="moment", quantity="M", place="x", gauge=True, label="bending moment at x"),
-    Output(name="full_moment", quantity="M", place="x", label="bending moment with damping at x"),
-    Output(name="strain", quantity="strain", place="x", gauge=True, label="bending strain at x"),
-    Output(name="shear", quantity="Q", place="x", label="shear force at x"),
-)})  # fmt: skip
+OUTPUTS: Mapping[str, Output] = MappingProxyType(
+    {
+        each.name: each
+        for each in (
+            Output(quantity="theta", place="root", label="hub angle"),
+            Output(quantity="theta", place="root", power=1, label="hub rate"),
+            Output(quantity="W", place="tip", label="tip displacement"),
+            Output(quantity="Y", place="tip", label="tip deflection"),
+            Output(quantity="W", place="tip", power=2, label="tip acceleration"),
+            Output(quantity="M", place="root", gauge=True, label="root moment"),
+            Output(name="root_shear", quantity="Q", place="root", label="root shear force"),
+            Output(quantity="current", place="root", label="motor current"),
+            Output(quantity="Phi", place="tip", label="tip rotation"),
+            Output(name="tip_angle", quantity="Psi", place="tip", label="tip angle in space"),
+            Output(quantity="centre", place="tip", label="payload displacement"),
+            Output(name="displacement", quantity="W", place="x", label="displacement at x"),
+            Output(name="velocity", quantity="W", place="x", power=1, label="velocity at x"),
+            Output(name="acceleration", quantity="W", place="x", power=2, label="acceleration at x"),
+            Output(name="deflection", quantity="Y", place="x", label="deflection at x"),
+            Output(name="rotation", quantity="Phi", place="x", label="rotation at x"),
+            Output(name="moment", quantity="M", place="x", gauge=True, label="bending moment at x"),
+            Output(name="full_moment", quantity="M", place="x", label="bending moment with damping at x"),
+            Output(name="strain", quantity="strain", place="x", gauge=True, label="bending strain at x"),
+            Output(name="shear", quantity="Q", place="x", label="shear force at x"),
+        )
+    }
+)
 
 
 def output(wanted: str | Output) -> Output:

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arrays import Complex
-
-from .compiled import inlined
-from .waves import (
+from tfarm.exact.compiled import inlined
+from tfarm.exact.waves import (
     PARALLEL,
     SolutionPlane,
     SolutionRow,
@@ -36,12 +35,14 @@ from .waves import (
     wave_sums,
 )
 
-BLOCK = 32  # points of a block: few for single points, many for the overhead of loops
+# points of a block: few for single points, many for the overhead of loops
+BLOCK = 32
 # A plane; on the way back of a mark its state, W - r theta and Psi - theta there.
 LIFT, TURN, PLANE_SIZE = (BLOCK * j for j in (4, 5, 6))
 # Of a segment S, d and g S; z, v, t and dt of each wave, then its c, s, e and t + dt; F0..F3, F2 - 1 and F3 - 1.
 S_SQUARED, ONE, TWO, SERIES, WAVES_SIZE = (BLOCK * j for j in (0, 3, 11, 19, 25))
-FUNCTIONS, PHASE = (BLOCK * j for j in (4, 7))  # of a wave
+# of a wave
+FUNCTIONS, PHASE = (BLOCK * j for j in (4, 7))
 F1, F2_LESS_1, F3_LESS_1 = (SERIES + BLOCK * j for j in (1, 4, 5))
 
 
@@ -117,7 +118,11 @@ def cross(points: Any, row: Any, j: int, work: BlockBuffers, lost: Any) -> None:
             one, two, gS, d = waves_at(row, waves, i)
             gap = one[2] - two[2]
             write_point(
-                inner, i, scale_plane(across_waves(one, two, gS, d, plane_at(outer, i)), reciprocal(gS * d * gap * gap))
+                inner,
+                i,
+                scale_plane(
+                    across_waves(one, two, gS, d, plane_at(outer, i)), reciprocal(gS * d * gap * gap)
+                ),
             )
         for i in range(BLOCK):
             z1 = waves[ONE + i]
@@ -161,7 +166,9 @@ def waves_at(row: Any, waves: Any, i: int) -> tuple[Wave, Wave, complex, complex
 
 
 @inlined
-def rows_at(s: complex, row: Any, waves: Any, i: int) -> tuple[SolutionRow, SolutionRow, SolutionRow, SolutionRow]:
+def rows_at(
+    s: complex, row: Any, waves: Any, i: int
+) -> tuple[SolutionRow, SolutionRow, SolutionRow, SolutionRow]:
     """Return the transition matrix of a slow segment at a point from F0..F3 in the chain's units."""
     over_d = times(reciprocal(1.0 + row.damping * s), 1.0 / row.stiffness)
     return transition_rows(row_at(waves, SERIES + i), s * s, over_d, row.of_chain)

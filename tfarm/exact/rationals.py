@@ -17,10 +17,10 @@ import numpy as np
 
 from tfarm.arm.blocks import LawBlock, Rational
 from tfarm.arrays import Complex, Real
+from tfarm.exact.balls import exact_middle, fraction, precision
 
-from .balls import exact_middle, fraction, precision
-
-Matrix = Any  # flint.fmpq_mat or flint.fmpz_mat, which come without types
+# flint.fmpq_mat or flint.fmpz_mat, which come without types
+Matrix = Any
 
 
 def exact_matrix(matrix: Real) -> Matrix:
@@ -41,14 +41,14 @@ def falls(P: Matrix, A: Real) -> bool:
     return is_positive_definite(P * unit**2 - numbers.transpose() * P * numbers)
 
 
-AT_MINUS_ONE = -2.0  # delta of z = -1, the image of s = infinity under Tustin's rule
+# delta of z = -1, the image of s = infinity under Tustin's rule
+AT_MINUS_ONE = -2.0
 # of the first precision of a held block, which is doubled
-BITS_A_STATE = 64
-SPARE_STATES = 8
-ENOUGH_BITS = 80  # of a coefficient of a held block: more than a double
-MOST_DOUBLINGS = 5  # of the precision: a coefficient without digits by then is 0
+# of a coefficient of a held block: more than a double
+ENOUGH_BITS = 80
 
-Gained = tuple[float, Complex]  # g and the zeros of g prod(delta - zeros)
+# g and the zeros of g prod(delta - zeros)
+Gained = tuple[float, Complex]
 
 
 def block_factors(block: LawBlock, rule: str, T: float, c: float) -> tuple[Complex, list[Gained]]:
@@ -79,7 +79,9 @@ def polynomials(block: LawBlock) -> tuple[list[Any], Any]:
     Those of matrices are det(s - A + B_j C) + (D_j - 1) det(s - A) and det(s - A).
     """
     if isinstance(block, Rational):
-        num, den = (flint.fmpq_poly([fraction(each) for each in reversed(of)]) for of in (block.num, block.den))
+        num, den = (
+            flint.fmpq_poly([fraction(each) for each in reversed(of)]) for of in (block.num, block.den)
+        )
         return [num], den
     A, _, C, D = map(exact_matrix, block.matrices())
     columns = [exact_matrix(column[:, None]) for column in block.matrices()[1].T]
@@ -141,7 +143,10 @@ def _of_matched(num: Any, den: Any, T: float) -> Gained:
 
 def _of_held(nums: list[Any], den: Any, T: float) -> list[Gained]:
     """Return gain and zeros of each signal behind a zero-order hold."""
-    with precision(BITS_A_STATE * (den.degree() + SPARE_STATES)):
+    # of the first precision of a held block, which is doubled
+    bits_a_state = 64
+    spare_states = 8
+    with precision(bits_a_state * (den.degree() + spare_states)):
         held = [_held_numerator(num, den, fraction(T)) for num in nums]
     return [(_leading(each, flint.fmpq_poly([1])), _roots(each)) for each in held]
 
@@ -151,8 +156,10 @@ def _held_numerator(num: Any, den: Any, T: Any) -> Any:
 
     For a block without a value at rest it has a simple zero at delta = 0.
     """
+    # of the precision: a coefficient without digits by then is 0
+    most_doublings = 5
     known = min(_zeros_at_0(num), _zeros_at_0(den) + 1) if num else 0
-    for _ in range(MOST_DOUBLINGS):
+    for _ in range(most_doublings):
         balls = _held_coefficients(num, den, T)[known:]
         if not num or all(each.rel_accuracy_bits() >= ENOUGH_BITS for each in balls):
             break

@@ -13,12 +13,11 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.arrays import Complex
-
-from .balls import Sweep, fraction
-from .layout import Layout, readings
-from .outputs import Output
-from .system import Body, Offset, Segment, system_of
-from .waves import SolutionPlane, SolutionRow
+from tfarm.exact.balls import Sweep, fraction
+from tfarm.exact.layout import Layout, readings
+from tfarm.exact.outputs import Output
+from tfarm.exact.system import Body, Offset, Segment, system_of
+from tfarm.exact.waves import SolutionPlane, SolutionRow
 
 
 def rigid_response(arm: Arm, wanted: Output, s: Complex, x: float = 0.0) -> Complex:

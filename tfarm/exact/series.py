@@ -6,16 +6,19 @@ from typing import Any
 
 import flint
 
-from .balls import Ball, Sweep, precision, rational, sum_series
-from .layout import Layout, readings
-from .outputs import Output
-from .system import Place, System
+from tfarm.exact.balls import Ball, Sweep, precision, rational, sum_series
+from tfarm.exact.layout import Layout, readings
+from tfarm.exact.outputs import Output
+from tfarm.exact.system import Place, System
 
-SERIES_BITS = 512  # of the power series at s = 0, whose coefficients are sums of small differences
-KNOWN_ZERO = 1e-80  # share of the largest coefficient, below which one is an exact zero
-SERIES_KEPT = 512  # expansions at s = 0 of rigs and outputs: those of a report of six rigs
-SLOW_POLE_STEPS = 8  # of Newton's method for a pole next to 0, each doubling its digits
-SERIES_ORDER = 8  # of the power series: the drive begins at s^2 at most
+# of the power series at s = 0, whose coefficients are sums of small differences
+SERIES_BITS = 512
+# share of the largest coefficient, below which one is an exact zero
+KNOWN_ZERO = 1e-80
+# expansions at s = 0 of rigs and outputs: those of a report of six rigs
+SERIES_KEPT = 512
+# of the power series: the drive begins at s^2 at most
+SERIES_ORDER = 8
 
 
 class SlowSweep(Sweep):
@@ -70,12 +73,15 @@ def without_slow_pole(chain: System, wanted: Sequence[Output], x: float) -> list
     Those of r/(s - p) are c_k = -r/p^(k+1), and dominate from some n on.  So the rest is c_k - p^(n-k) c_n, with an
     error of (p/w)^(n-k), w the next pole.  In float64 it would be lost in -r/p.
     """
+    # of Newton's method for a pole next to 0, each doubling its digits
+    slow_pole_steps = 8
     drive = _at_zero(chain)
     first = _leading(drive)
     with precision(SERIES_BITS):
         p: Ball = rational(0)
         D: Any = flint.arb_poly(drive[first:])
-        for _ in range(SLOW_POLE_STEPS):  # Newton's method on a power series that is nearly a line there
+        # Newton's method on a power series that is nearly a line there
+        for _ in range(slow_pole_steps):
             p = p - D(p) / D.derivative()(p)
         found = []
         for each in wanted:

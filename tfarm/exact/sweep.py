@@ -13,19 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.records import read_only
-
-from .compiled import compiled, inlined
-from .layout import (
-    BODY,
-    MARK,
-    OF_ANGLE,
-    OF_MOMENT,
-    OFFSET,
-    SEGMENT,
-    SPRING,
-)
-from .pieces import (
+from tfarm.exact.compiled import compiled, inlined
+from tfarm.exact.layout import BODY, MARK, OF_ANGLE, OF_MOMENT, OFFSET, SEGMENT, SPRING
+from tfarm.exact.pieces import (
     BLOCK,
     F1,
     F2_LESS_1,
@@ -44,7 +34,7 @@ from .pieces import (
     times,
     write_point,
 )
-from .waves import (
+from tfarm.exact.waves import (
     Number,
     SolutionPlane,
     SolutionRow,
@@ -61,12 +51,10 @@ from .waves import (
     reciprocal,
     tip_conditions,
 )
+from tfarm.records import read_only
 
-LN_2 = math.log(2.0)
-POLE = 1e-11  # a drive below this share of its terms is flagged, as it may be a pole
-DIFFERENCE = 0.5  # an output below this share of its terms has lost a bit and is summed from the axis instead,
-SMALL_DIFFERENCE = 0.05  # or else flagged below this share, with four lost bits
-AXIS = read_only(np.array([[1.0], [0.0], [0.0], [0.0]]))  # the condition W = 0 there, at every point
+# the condition W = 0 there, at every point
+AXIS = read_only(np.array([[1.0], [0.0], [0.0], [0.0]]))
 
 
 @inlined
@@ -90,6 +78,7 @@ def _work(rows: int) -> BlockBuffers:
 @inlined
 def _sweep(points: Any, rows: Any, ends: Any, work: BlockBuffers, lost: Any) -> None:
     """Compute the plane inside of each element, and the scale of that at the axis; mark lost digits."""
+    ln_2 = math.log(2.0)
     for i in range(BLOCK):
         write_point(work.planes[0], i, end_plane(*tip_conditions(ends, points[i] * points[i])))
         work.scale[i], lost[i] = 0.0, False
@@ -107,10 +96,12 @@ def _sweep(points: Any, rows: Any, ends: Any, work: BlockBuffers, lost: Any) -> 
             continue
         else:
             for i in range(BLOCK):
-                write_point(inner, i, inside(row.kind, row, points[i], points[i] * points[i], plane_at(outer, i)))
+                write_point(
+                    inner, i, inside(row.kind, row, points[i], points[i] * points[i], plane_at(outer, i))
+                )
         _brought_back(inner, 5, work.powers[j])
         for i in range(BLOCK):
-            work.scale[i] += work.powers[j, i] * LN_2
+            work.scale[i] += work.powers[j, i] * ln_2
 
 
 @inlined
@@ -169,7 +160,8 @@ def _go_back(points: Any, rows: Any, outermost: int, work: BlockBuffers, differs
     shift = np.zeros(BLOCK, np.int64)
     for i in range(BLOCK):
         work.theta[i] = met(row_at(back, i), plane_at(axis, i))[1]
-        back[LIFT + i] = back[TURN + i] = 0.0  # W = 0 on the axis, of a mode also where another condition determines it
+        # W = 0 on the axis, of a mode also where another condition determines it
+        back[LIFT + i] = back[TURN + i] = 0.0
     for j in range(len(rows) - 1, outermost - 1, -1):
         row = rows[j]
         if row.kind == MARK:
@@ -271,7 +263,9 @@ def drive_at(s: complex, segment: Any, ends: Any, theta: complex, M: complex) ->
 
 
 @compiled
-def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, lost: Any, per_input: bool) -> None:
+def fill_free(
+    s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, lost: Any, per_input: bool
+) -> None:
     """Compute drive, scale and each output of the free response at s (1-D), rows of `found`; mark lost digits.
 
     It satisfies axis . (W, Psi, M, Q) = 0 on the hub's axis, W = 0 for `AXIS`; `axis` (4, n) has one column, or one for
@@ -292,7 +286,8 @@ def fill_free(s: Any, rows: Any, ends: Any, axis: Any, table: Any, found: Any, l
     points = np.empty(BLOCK, np.complex128)
     over = np.ones(BLOCK, np.complex128)
     lost_here = np.empty(BLOCK, np.bool_)
-    small = 1.0 / max(1.0, ends[OF_ANGLE + 1], ends[OF_ANGLE + 2])  # against overflow of squares of a heavy hub's drive
+    # against overflow of squares of a heavy hub's drive
+    small = 1.0 / max(1.0, ends[OF_ANGLE + 1], ends[OF_ANGLE + 2])
     for first in range(0, s.size, BLOCK):
         n = min(BLOCK, s.size - first)
         for i in range(BLOCK):
@@ -329,9 +324,11 @@ def innermost(rows: Any) -> Any:
 @inlined
 def _drive(points: Any, segment: Any, ends: Any, plane: Any, drive: Any, lost: Any) -> None:
     """Compute the drive at every point of a block; digits are lost where it is small."""
+    # a drive below this share of its terms is flagged, as it may be a pole
+    pole = 1e-11
     for i in range(BLOCK):
         drive[i], terms = drive_at(points[i], segment, ends, plane[i], plane[BLOCK + i])
-        lost[i] = lost[i] or magnitude(drive[i]) < POLE * terms
+        lost[i] = lost[i] or magnitude(drive[i]) < pole * terms
 
 
 @inlined
@@ -340,6 +337,10 @@ def _output(points: Any, want: Any, work: BlockBuffers, drive: Any, over: Any, v
 
     Until its power of s it is times 2^100: at the tip W would underflow where s^2 W does not.
     """
+    # an output below this share of its terms has lost a bit and is summed from the axis instead,
+    difference = 0.5
+    # or else flagged below this share, with four lost bits
+    small_difference = 0.05
     j = int(want[0])
     field = BLOCK * int(want[1])
     lift = 2.0**100
@@ -366,11 +367,11 @@ def _output(points: Any, want: Any, work: BlockBuffers, drive: Any, over: Any, v
                 at = times(at, lift)
             size = magnitude(value[i])
             value[i] += at
-            if of_theta != 0.0 and magnitude(value[i]) < DIFFERENCE * size:
+            if of_theta != 0.0 and magnitude(value[i]) < difference * size:
                 if np.isfinite(states[LIFT + i].real):
                     value[i] = times(states[LIFT + field + i], lift)
                 else:
-                    lost[i] = lost[i] or magnitude(value[i]) < SMALL_DIFFERENCE * size
+                    lost[i] = lost[i] or magnitude(value[i]) < small_difference * size
     for i in range(BLOCK):
         value[i] *= over[i]
     finish_output(points, value, int(want[3]), want[4] / lift, want[5], value)

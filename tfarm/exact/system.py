@@ -28,13 +28,13 @@ from tfarm.arm.stages import Consumer
 from tfarm.arm.writing import arm_table
 from tfarm.arrays import Complex, Real
 from tfarm.errors import must_be_known
+from tfarm.exact.outputs import Side
 from tfarm.records import frozen
-
-from .outputs import Side
 
 ZERO = Fraction(0)
 ONE = Fraction(1)
-Inertia = Fraction | float  # a fraction, or math.inf
+# a fraction, or math.inf
+Inertia = Fraction | float
 
 
 class Segment(NamedTuple):
@@ -71,7 +71,12 @@ class Segment(NamedTuple):
         EI = self.stiffness
         if l == EI == 1:
             return self.a, self.b, self.g, self.sigma
-        return self.a * EI / (l * l), self.b / (l * l), self.g * EI / (l * l * l * l), self.sigma * (l * l) / EI
+        return (
+            self.a * EI / (l * l),
+            self.b / (l * l),
+            self.g * EI / (l * l * l * l),
+            self.sigma * (l * l) / EI,
+        )
 
 
 class Offset(NamedTuple):
@@ -167,9 +172,11 @@ def end_condition(inertia: Inertia) -> tuple[Fraction, Fraction, Fraction]:
     return ZERO, inertia / (1 + inertia), 1 / (1 + inertia)
 
 
-PAYLOAD, OUTER, BODY, INNER, NEXT = range(5)  # the order at one point, from the payload inwards
+# the order at one point, from the payload inwards
+PAYLOAD, OUTER, BODY, INNER, NEXT = range(5)
 
-Placed = tuple[Fraction, int, Element]  # distance from the clamp (of a segment's outer end), order there, and element
+# distance from the clamp (of a segment's outer end), order there, and element
+Placed = tuple[Fraction, int, Element]
 
 
 def elements_with_places(elements: Iterable[Element]) -> Iterator[Placed]:
@@ -186,7 +193,9 @@ def cut_segments(elements: Sequence[Placed]) -> tuple[Element, ...]:
     """Return elements in their order from the payload inwards, each segment cut where there is another one on it."""
     ordered = sorted(elements, key=lambda each: (-each[0], each[1]))
     found: list[Element] = []
-    for (position, _, each), inner_end in zip(ordered, [*(at for at, _, _ in ordered[1:]), ZERO], strict=True):
+    for (position, _, each), inner_end in zip(
+        ordered, [*(at for at, _, _ in ordered[1:]), ZERO], strict=True
+    ):
         if isinstance(each, Segment):
             segment = each
         else:
@@ -217,7 +226,8 @@ def stiffness_of(link: Link) -> Fraction:
 
 
 CONSUMER = Consumer("exact solution", acts=("plant",))
-SYSTEMS_KEPT = 64  # arms whose exact numbers are cached: one page needs those of one arm some thousand times
+# arms whose exact numbers are cached: one page needs those of one arm some thousand times
+SYSTEMS_KEPT = 64
 
 
 @frozen(kw_only=True)
@@ -391,7 +401,9 @@ def hub_drive(arm: Arm, rotation: Fraction) -> Drive:
     motor = arm.motor
     if arm.is_locked:
         return Drive(turns=False)
-    inertia, friction, stiffness = (Fraction(each) * rotation for each in (hub.inertia, hub.friction, hub.stiffness))
+    inertia, friction, stiffness = (
+        Fraction(each) * rotation for each in (hub.inertia, hub.friction, hub.stiffness)
+    )
     drive = Drive(True, inertia, friction, stiffness, unit=1 / rotation)
     if motor is None:
         return drive

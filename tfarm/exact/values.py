@@ -21,25 +21,24 @@ from numpy.typing import NDArray
 from tfarm.arm import Arm, Theory
 from tfarm.arrays import Complex, Real
 from tfarm.errors import CertificationError, ParameterError, must_be_known, require
+from tfarm.exact.balls import Ball, Sweep, first_success, nearest_float, point, rational
+from tfarm.exact.layout import Layout, OutputFormula, readings
+from tfarm.exact.outputs import Output
+from tfarm.exact.series import constant_of, expansion_at_zero
+from tfarm.exact.sweep import AXIS, fill_free
+from tfarm.exact.system import ONE, ZERO, Place, System
 from tfarm.records import frozen, read_only
 from tfarm.schema import Quantity
 
-from .balls import Ball, Sweep, first_success, nearest_float, point, rational
-from .layout import Layout, OutputFormula, readings
-from .outputs import Output
-from .series import constant_of, expansion_at_zero
-from .sweep import AXIS, fill_free
-from .system import ONE, ZERO, Place, System
-
-AT_A_POLE = 4 * float(np.finfo(float).eps)  # of |s|: the distance of a pole within which no digit is right
 _Value = TypeVar("_Value")
 
-PROVEN_BITS = 60  # more than a float64 has
-MOST_ENCLOSURE_BITS = 1 << 18  # of working precision: at a pole no number of them is enough
+# more than a float64 has
+PROVEN_BITS = 60
+# of working precision: at a pole no number of them is enough
+MOST_ENCLOSURE_BITS = 1 << 18
 _UPPER_HALF = np.exp(1j * np.pi * np.arange(1, 8) / 8)
-SLOPE_CIRCLE = np.r_[1.0, _UPPER_HALF, -1.0, _UPPER_HALF[::-1].conj()]  # in conjugate pairs
-SLOPE_RADIUS = 0.3  # of that circle, of |s| over the phase of all waves: the 16th Taylor term is below 1e-17
-CLEAR_OF_SINGULAR = 0.1  # of the way to a -1/C: its radius at most
+# in conjugate pairs
+SLOPE_CIRCLE = np.r_[1.0, _UPPER_HALF, -1.0, _UPPER_HALF[::-1].conj()]
 
 
 # ------------------------------------------------------------ the free response
@@ -78,11 +77,15 @@ def _filled(
 
 def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -> tuple[Free, Free]:
     """Return the free response and its derivative at s (1-D), by Cauchy's integral on a circle, to rounding."""
+    # of that circle, of |s| over the phase of all waves: the 16th Taylor term is below 1e-17
+    slope_radius = 0.3
+    # of the way to a -1/C: its radius at most
+    clear_of_singular = 0.1
     layout = readings(chain, wanted, x)
     here = free_of(layout, s)
-    radius = SLOPE_RADIUS * np.maximum(abs(s), 1e-150) / np.maximum(1.0, abs(here.scale))
+    radius = slope_radius * np.maximum(abs(s), 1e-150) / np.maximum(1.0, abs(here.scale))
     for each in chain.singular:
-        radius = np.minimum(radius, CLEAR_OF_SINGULAR * abs(s - each))
+        radius = np.minimum(radius, clear_of_singular * abs(s - each))
     circle = free_of(layout, (s[:, None] + radius[:, None] * SLOPE_CIRCLE).ravel())
     scales = circle.scale.reshape(-1, SLOPE_CIRCLE.size)
     here = here._replace(scale=np.where(np.isfinite(here.scale), here.scale, scales[:, 0]))
@@ -90,7 +93,8 @@ def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -
     slope = 1.0 / SLOPE_CIRCLE / radius[:, None]
     drive = circle.drive.reshape(scales.shape) * values
     outputs = circle.outputs.reshape(-1, *scales.shape) * values
-    if here.lost.any():  # there the values are means over the circle, as where two waves are one
+    # there the values are means over the circle, as where two waves are one
+    if here.lost.any():
         here = here._replace(
             drive=np.where(here.lost, _mean(drive), here.drive),
             outputs=np.where(here.lost, _mean(outputs), here.outputs),
@@ -161,7 +165,9 @@ def _with_care(
     return values
 
 
-def value_with_care(k: System, wanted: Output, s: complex, x: float = 0.0, *, of_slope: bool = False) -> complex:
+def value_with_care(
+    k: System, wanted: Output, s: complex, x: float = 0.0, *, of_slope: bool = False
+) -> complex:
     """Return one output, or its slope, at one s from a certified enclosure, or from the expansion at s = 0.
 
     Raises ParameterError at a pole, and for a value larger than any float64.
@@ -169,13 +175,17 @@ def value_with_care(k: System, wanted: Output, s: complex, x: float = 0.0, *, of
     _refuse_pole(k, wanted, s, x)
     if s == 0:
         return complex(expansion_at_zero(k, wanted, x)[2 + of_slope])
-    value = nearest_float(slope(k, wanted, s, x) if of_slope else enclose(k, wanted, s, bits=PROVEN_BITS, x=x))
+    value = nearest_float(
+        slope(k, wanted, s, x) if of_slope else enclose(k, wanted, s, bits=PROVEN_BITS, x=x)
+    )
     require(np.isfinite(value), "s", s, f"{wanted.name} is larger than any float64 there; choose another s")
     return value
 
 
 def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
     """Raise ParameterError if s is a pole to the last digit of a float64."""
+    # of |s|: the distance of a pole within which no digit is right
+    at_a_pole = 4 * float(np.finfo(float).eps)
     if constant_of(k, wanted, x) is not None:
         return
     if s == 0:
@@ -184,9 +194,12 @@ def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
         return
     with np.errstate(all="ignore"):
         here, slopes = free_slopes(k, (), np.array([s]), 0.0)
-    if abs(here.drive[0]) < AT_A_POLE * abs(s) * abs(slopes.drive[0]):  # both 0 where s^2 underflows: no pole there
+    # both 0 where s^2 underflows: no pole there
+    if abs(here.drive[0]) < at_a_pole * abs(s) * abs(slopes.drive[0]):
         name = f"a natural frequency, {abs(s):.10g} rad/s" if s.real == 0 else f"an eigenvalue, {s:.10g} 1/s"
-        raise ParameterError(key="s", value=s, remedy=f"a pole: {name}; the response is infinite there, move s")
+        raise ParameterError(
+            key="s", value=s, remedy=f"a pole: {name}; the response is infinite there, move s"
+        )
 
 
 # ------------------------------------------------------------ enclosures, at a growing precision
@@ -240,7 +253,8 @@ def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0
     Raises ParameterError at a pole, CertificationError next to one and at an exact zero.
     """
     _refuse_pole(k, wanted, s, x)
-    vanish = False, s.imag == 0  # of the real and of the imaginary part
+    # of the real and of the imaginary part
+    vanish = False, s.imag == 0
     if s.real == 0 != s.imag and k.is_real_on_axis:
         vanish = wanted.power % 2 == 1, wanted.power % 2 == 0
 
@@ -250,7 +264,9 @@ def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0
             return None
         zero = flint.arb(0)
         bits = math.ceil(3.33 * digits) + 8
-        re, im = (zero if is_zero else part for is_zero, part in zip(vanish, (value.real, value.imag), strict=True))
+        re, im = (
+            zero if is_zero else part for is_zero, part in zip(vanish, (value.real, value.imag), strict=True)
+        )
         if accurate_ball(re, bits) is None or accurate_ball(im, bits) is None:
             return None
         return written(re), written(im)
@@ -266,7 +282,9 @@ def certify_by_precision(bits: int, attempt: Callable[[], _Value | None], number
 
     Raises CertificationError, naming the number and s, where none has one.
     """
-    precisions = takewhile(lambda working: working < MOST_ENCLOSURE_BITS, ((2 * bits + 64) << n for n in count()))
+    precisions = takewhile(
+        lambda working: working < MOST_ENCLOSURE_BITS, ((2 * bits + 64) << n for n in count())
+    )
     failure = CertificationError(f"no {number} at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
     return first_success(precisions, attempt, failure)
 
@@ -274,8 +292,8 @@ def certify_by_precision(bits: int, attempt: Callable[[], _Value | None], number
 Method = Literal["closed-form", "balls", "appendix"]
 METHODS: tuple[Method, ...] = get_args(Method)
 
-APPENDIX_DIGITS = 17  # of the appendix: more than a float64 holds
-METHODS_AGREE = 1e-14  # relative: some tens of roundings of a float64
+# of the appendix: more than a float64 holds
+APPENDIX_DIGITS = 17
 
 
 class MethodRow(NamedTuple):
@@ -289,7 +307,9 @@ class MethodRow(NamedTuple):
     ]
     appendix: Annotated[
         float | None,
-        Quantity("difference of the appendix", digits=2, help="relative, of the paper's determinant in mpmath"),
+        Quantity(
+            "difference of the appendix", digits=2, help="relative, of the paper's determinant in mpmath"
+        ),
     ]
 
 
@@ -303,11 +323,17 @@ class ByMethod:
     @property
     def differences(
         self,
-    ) -> Annotated[dict[Method, Real], Quantity(help="relative difference of each method from the closed form")]:
+    ) -> Annotated[
+        dict[Method, Real], Quantity(help="relative difference of each method from the closed form")
+    ]:
         """The relative difference of each from the closed form; the absolute one where that is 0."""
         fast = self.values["closed-form"]
         size = np.where(fast == 0, 1.0, abs(fast))
-        return {name: np.asarray(abs(each - fast) / size) for name, each in self.values.items() if each is not fast}
+        return {
+            name: np.asarray(abs(each - fast) / size)
+            for name, each in self.values.items()
+            if each is not fast
+        }
 
     @property
     def largest_difference(
@@ -319,9 +345,17 @@ class ByMethod:
     @property
     def finding(
         self,
-    ) -> Annotated[str, Quantity("methods", help="methods compared, and whether they differ by rounding alone")]:
+    ) -> Annotated[
+        str, Quantity("methods", help="methods compared, and whether they differ by rounding alone")
+    ]:
         """The agreement of the methods in words."""
-        word = "agree to rounding" if self.largest_difference <= METHODS_AGREE else "differ by more than rounding"
+        # relative: some tens of roundings of a float64
+        methods_agree = 1e-14
+        word = (
+            "agree to rounding"
+            if self.largest_difference <= methods_agree
+            else "differ by more than rounding"
+        )
         return f"{', '.join(self.values)}: {word}"
 
     def rows(self, at: Sequence[Any]) -> list[MethodRow]:
@@ -335,7 +369,9 @@ class ByMethod:
 def by_method(value: Callable[[Method], NDArray[Any]], no_appendix: str) -> ByMethod:
     """Return the values of each method, without the appendix where `no_appendix` is a reason."""
     left_out: dict[Method, str] = {"appendix": no_appendix} if no_appendix else {}
-    return ByMethod({method: np.asarray(value(method)) for method in METHODS if method not in left_out}, left_out)
+    return ByMethod(
+        {method: np.asarray(value(method)) for method in METHODS if method not in left_out}, left_out
+    )
 
 
 def known_method(method: str) -> Method:
@@ -358,18 +394,26 @@ def must_be_of_appendix(arm: Arm, theory: Theory, wanted: Sequence[Output] = ())
     require(not words, "method", "appendix", words)
 
 
-def slow_values(method: Method, arm: Arm, k: System, wanted: Sequence[Output], s: Complex, x: float) -> Complex:
+def slow_values(
+    method: Method, arm: Arm, k: System, wanted: Sequence[Output], s: Complex, x: float
+) -> Complex:
     """Return outputs (rows) at s (1-D) one by one, by the balls or by the appendix; x is a share of the length.
 
     Raises ParameterError at a pole to the last digit of float64, ConvergenceError where the appendix has no limit.
     """
     if method == "balls":
-        return np.array([[value_with_care(k, each, complex(at), each.share(x)) for at in s] for each in wanted])
-    from . import appendix  # here: mpmath takes a while to load
+        return np.array(
+            [[value_with_care(k, each, complex(at), each.share(x)) for at in s] for each in wanted]
+        )
+    # here: mpmath takes a while to load
+    from tfarm.exact import appendix
 
     must_be_of_appendix(arm, arm.theory, wanted)
     place = x * arm.link.length
     digits = APPENDIX_DIGITS
     return np.array(
-        [[complex(appendix.output_value(arm, each, complex(at), digits, place)) for at in s] for each in wanted]
+        [
+            [complex(appendix.output_value(arm, each, complex(at), digits, place)) for at in s]
+            for each in wanted
+        ]
     )

@@ -49,15 +49,20 @@ from typing import Any
 
 import numpy as np
 
-from .compiled import compiled, fma, inlined
+from tfarm.exact.compiled import compiled, fma, inlined
 
-Number = Any  # float, complex, ndarray, series or ball
-Double = tuple[complex, complex]  # a number as a sum of two, the second below the last place of the first
+# float, complex, ndarray, series or ball
+Number = Any
+# a number as a sum of two, the second below the last place of the first
+Double = tuple[complex, complex]
 
-SERIES_RADIUS = 6.0  # |z_j| below which the series are used
-SERIES_TERMS = 14  # the first term left out is below 15 * 6^14/28! = 4e-18
+# |z_j| below which the series are used
+SERIES_RADIUS = 6.0
+# the first term left out is below 15 * 6^14/28! = 4e-18
+SERIES_TERMS = 14
 INVERSE_FACTORIAL = np.array([1.0 / math.factorial(n) for n in range(2 * SERIES_TERMS + 2)])
-PARALLEL = 0.15  # |z_1 - z_2| below this share of |z_1| + |z_2|: flagged
+# |z_1 - z_2| below this share of |z_1| + |z_2|: flagged
+PARALLEL = 0.15
 
 
 @inlined
@@ -142,7 +147,8 @@ def dispersion(s: complex, k: Any) -> tuple[tuple[complex, complex, complex], So
     mean = 0.5 * (bend + shear)
     spread = _square_root(0.25 * (bend - shear) * (bend - shear) - couple)
     spread = spread * (1.0 if mean.real * spread.real + mean.imag * spread.imag >= 0.0 else -1.0)
-    z1 = mean + spread  # the larger root; the other from the product, without cancellation
+    # the larger root; the other from the product, without cancellation
+    z1 = mean + spread
     z2 = (bend * shear + couple) * reciprocal(z1)
     return (S[0], d, gS[0]), _corrected(z1, (d, d_low), aS, bS, gS), _corrected(z2, (d, d_low), aS, bS, gS)
 
@@ -164,7 +170,8 @@ def _corrected(z: complex, damper: Double, aS: Double, bS: Double, gS: Double) -
     t = _square_root(z)
     square, square_low = _two_product(t, t)
     remainder = ((z - square) - square_low) + step
-    smooth = 0.5 / (t.real * t.real + t.imag * t.imag + 1e-20)  # t = 0 at the cut-off, where no dt is needed
+    # t = 0 at the cut-off, where no dt is needed
+    smooth = 0.5 / (t.real * t.real + t.imag * t.imag + 1e-20)
     return z + step, v + (v_low + step), t, remainder * complex(t.real * smooth, -t.imag * smooth)
 
 
@@ -257,9 +264,12 @@ def impedance(S: float, k: Any) -> float:
     return min(inertia, math.sqrt(math.sqrt(inertia)) + math.sqrt(S * (k.a + k.b)))
 
 
-Wave = tuple[Number, Number, Number, Number, Number]  # c, s, z, v, e: c and s are scaled by e = e^{-t}
-SolutionPlane = tuple[Number, Number, Number, Number, Number]  # p_WPsi, p_WM, p_WQ = -p_PsiM, p_PsiQ, p_MQ
-SolutionRow = tuple[Number, Number, Number, Number]  # f_W, f_Psi, f_M, f_Q
+# c, s, z, v, e: c and s are scaled by e = e^{-t}
+Wave = tuple[Number, Number, Number, Number, Number]
+# p_WPsi, p_WM, p_WQ = -p_PsiM, p_PsiQ, p_MQ
+SolutionPlane = tuple[Number, Number, Number, Number, Number]
+# f_W, f_Psi, f_M, f_Q
+SolutionRow = tuple[Number, Number, Number, Number]
 
 
 @inlined
@@ -336,7 +346,8 @@ def across_waves(one: Wave, two: Wave, gS: Number, d: Number, p: SolutionPlane) 
     B = v1 * MQ - 2.0 * gS * WQ + v2 * turned
     C = 2.0 * gS * WQ - v1 * turned - v2 * MQ
     v_sum = v1 + v2
-    kept = (d * WQ * v_sum - MQ - turned) * (e1 * e2)  # v1 alpha_1 ^ beta_1 d/(g S)
+    # v1 alpha_1 ^ beta_1 d/(g S)
+    kept = (d * WQ * v_sum - MQ - turned) * (e1 * e2)
     A, C, B, D = c1 * A - z1 * s1 * C, c1 * C - s1 * A, c1 * B - z1 * s1 * D, c1 * D - s1 * B
     A, B, C, D = c2 * A - z2 * s2 * B, c2 * B - s2 * A, c2 * C - z2 * s2 * D, c2 * D - s2 * C
     return (
@@ -389,7 +400,9 @@ def _minor(i: SolutionRow, j: SolutionRow, p: SolutionPlane) -> Number:
 
 
 @inlined
-def across_rows(W: SolutionRow, Psi: SolutionRow, M: SolutionRow, Q: SolutionRow, p: SolutionPlane) -> SolutionPlane:
+def across_rows(
+    W: SolutionRow, Psi: SolutionRow, M: SolutionRow, Q: SolutionRow, p: SolutionPlane
+) -> SolutionPlane:
     """Return the plane carried by `transition_rows`, for slow waves and for balls."""
     return _minor(W, Psi, p), _minor(W, M, p), _minor(W, Q, p), _minor(Psi, Q, p), _minor(M, Q, p)
 
@@ -449,7 +462,9 @@ def row_across_waves(one: Wave, two: Wave, gS: Number, d: Number, f: SolutionRow
 
 
 @inlined
-def row_across(W: SolutionRow, Psi: SolutionRow, M: SolutionRow, Q: SolutionRow, f: SolutionRow) -> SolutionRow:
+def row_across(
+    W: SolutionRow, Psi: SolutionRow, M: SolutionRow, Q: SolutionRow, f: SolutionRow
+) -> SolutionRow:
     """Return the condition carried outwards by `transition_rows`, f T^-1."""
     T = W, Psi, M, Q
     return _column(f, T, 0), _column(f, T, 1), _column(f, T, 2), _column(f, T, 3)

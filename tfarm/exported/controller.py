@@ -52,19 +52,31 @@ from tfarm.schema import Quantity
 CONSUMER = Consumer(
     "export c",
     acts=(
-        "anti-alias filter", "hub rate", "law", "DAC steps", "DAC range", "torque limit", "hold", "delay",
-        "hub damping", "plant",
+        "anti-alias filter",
+        "hub rate",
+        "law",
+        "DAC steps",
+        "DAC range",
+        "torque limit",
+        "hold",
+        "delay",
+        "hub damping",
+        "plant",
     ),
     named=("encoder", "amplifier steps", "arithmetic"),
     partly=("amplifier range",),
     none=("reference", "volts"),
-)  # fmt: skip
+)
 
 FILES = ("controller.h", "controller.c", "self_test.c", "example.c")
-REAL = {"double": ("double", "", "DBL_MAX"), "float": ("float", "f", "FLT_MAX"), FIXED: ("int32_t", "", "")}  # in C
-INPUT_ERROR, OVERFLOW, SATURATED, STATE_SATURATED = range(1, 5)  # status of a step, 0 of one without an event
-MINUEND, SUBTRAHEND = range(2)  # columns of a plan
-LARGEST = 2147483647  # of 32 bits
+# in C
+REAL = {"double": ("double", "", "DBL_MAX"), "float": ("float", "f", "FLT_MAX"), FIXED: ("int32_t", "", "")}
+# status of a step, 0 of one without an event
+INPUT_ERROR, OVERFLOW, SATURATED, STATE_SATURATED = range(1, 5)
+# columns of a plan
+MINUEND, SUBTRAHEND = range(2)
+# of 32 bits
+LARGEST = 2147483647
 
 
 @frozen(kw_only=True)
@@ -72,19 +84,55 @@ class WordLength:
     """Arithmetic of an exported controller: realisation, noise gains, bounds on states, errors and limit cycles."""
 
     precision: Annotated[str, Quantity("arithmetic", help="double, float or q31 (fixed point of 32 bits)")]
-    realisation: Annotated[str, Quantity("realisation", help="structure of the states, of least round-off noise")]
+    realisation: Annotated[
+        str, Quantity("realisation", help="structure of the states, of least round-off noise")
+    ]
     noise_gains: Annotated[list[NoiseGain], Quantity("noise gains", help="of each realisation")]
-    largest_states: Annotated[tuple[float, ...], Quantity("largest values of the states", "", 3,
-            help="bounds for inputs within their ranges; in fixed point over the range of each state")]  # fmt: skip
-    overflow: Annotated[str, Quantity("overflow", help="whether a state can overflow, for inputs within their ranges")]
-    largest_output: Annotated[float | None, Quantity("largest output of the law", "", 6,
-            help="bound for inputs within their ranges, before the limits of the output")]  # fmt: skip
-    saturation: Annotated[str, Quantity("saturation", help="limits of the output, and whether inputs reach them")]
-    error: Annotated[float | None, Quantity("bound on the error of the output", "", 4,
-            help="for inputs within their ranges, 1 SI unit by default, against exact arithmetic")]  # fmt: skip
-    samples: Annotated[int | None, Quantity("samples of these bounds", help="null where they hold for all samples")]
-    limit_cycle: Annotated[float | None, Quantity("bound on a limit cycle of the output by round-off", "", 4,
-            help="that roundings and a DAC in the code sustain at rest; null where not determined")]  # fmt: skip
+    largest_states: Annotated[
+        tuple[float, ...],
+        Quantity(
+            "largest values of the states",
+            "",
+            3,
+            help="bounds for inputs within their ranges; in fixed point over the range of each state",
+        ),
+    ]
+    overflow: Annotated[
+        str, Quantity("overflow", help="whether a state can overflow, for inputs within their ranges")
+    ]
+    largest_output: Annotated[
+        float | None,
+        Quantity(
+            "largest output of the law",
+            "",
+            6,
+            help="bound for inputs within their ranges, before the limits of the output",
+        ),
+    ]
+    saturation: Annotated[
+        str, Quantity("saturation", help="limits of the output, and whether inputs reach them")
+    ]
+    error: Annotated[
+        float | None,
+        Quantity(
+            "bound on the error of the output",
+            "",
+            4,
+            help="for inputs within their ranges, 1 SI unit by default, against exact arithmetic",
+        ),
+    ]
+    samples: Annotated[
+        int | None, Quantity("samples of these bounds", help="null where they hold for all samples")
+    ]
+    limit_cycle: Annotated[
+        float | None,
+        Quantity(
+            "bound on a limit cycle of the output by round-off",
+            "",
+            4,
+            help="that roundings and a DAC in the code sustain at rest; null where not determined",
+        ),
+    ]
 
 
 class Port(NamedTuple):
@@ -154,7 +202,8 @@ class Controller:
         else:
             hub = np.array([self.signals.index(ANGLE), *self.hub] if self.hub else [-1.0, 0.0, 1.0])
             run_real(table, self.plan, inputs, self.dac, hub, word.precision == "float", outputs, status)
-        is_good = ~np.isin(status, (INPUT_ERROR, OVERFLOW))  # a refused sample moves no delay line: the output is held
+        # a refused sample moves no delay line: the output is held
+        is_good = ~np.isin(status, (INPUT_ERROR, OVERFLOW))
         return np.r_[np.zeros(1 + self.delay, kind), outputs[is_good]][np.cumsum(is_good)], status
 
 
@@ -168,14 +217,18 @@ def c_controller(task: ExportTask) -> Export:
     controller = controller_of(law, task)
     word = controller.word
     case = task.case.under(word.rounded)
-    found = task.judged(case, "precision", task.precision, f"rounded to {task.precision} the loop", "take more digits")
+    found = task.judged(
+        case, "precision", task.precision, f"rounded to {task.precision} the loop", "take more digits"
+    )
     details = word_length(controller, name, gains, word.limit_cycle(found.verdict.loop))
     bounds = dict(facts_of(details)) | ({} if details.samples else {"samples of these bounds": "all"})
     contents, names = source_files(task, controller, [*task.facts(case, found).items()], [*bounds.items()])
     return task.exported(contents, names, found.verdict.sentence, details)
 
 
-def word_length(controller: Controller, name: str, gains: list[NoiseGain], limit_cycle: float | None) -> WordLength:
+def word_length(
+    controller: Controller, name: str, gains: list[NoiseGain], limit_cycle: float | None
+) -> WordLength:
     """The record of a controller's arithmetic, in the realisation of this name."""
     word = controller.word
     low, high = controller.limits
@@ -208,7 +261,10 @@ def word_length(controller: Controller, name: str, gains: list[NoiseGain], limit
 
 
 def source_files(
-    task: ExportTask, controller: Controller, facts: Sequence[tuple[str, str]], bounds: Sequence[tuple[str, str]] = ()
+    task: ExportTask,
+    controller: Controller,
+    facts: Sequence[tuple[str, str]],
+    bounds: Sequence[tuple[str, str]] = (),
 ) -> tuple[dict[str, bytes], list[Name]]:
     """The files that begin with these facts, by name, and the identifiers in them, that of the controller first.
 
@@ -245,14 +301,20 @@ def controller_of(law: Law, task: ExportTask) -> Controller:
     T = chain.sampling.period
     dac = quantisers(chain)[DAC]
     is_estimated = of.hub_rate == "difference" and RATE in law.signals
-    remedy = 'with q31 the hub rate is an input, or the law reads hub_angle: set converters.hub_rate = "ideal"'
+    remedy = (
+        'with q31 the hub rate is an input, or the law reads hub_angle: set converters.hub_rate = "ideal"'
+    )
     require(not (is_estimated and task.precision == FIXED), "converters.hub_rate", of.hub_rate, remedy)
     signals = tuple(dict.fromkeys(ANGLE if is_estimated and name == RATE else name for name in law.signals))
-    references = tuple(dict.fromkeys((*law.references, *(name.removeprefix(REFERENCE) for name in law.wanted))))
+    references = tuple(
+        dict.fromkeys((*law.references, *(name.removeprefix(REFERENCE) for name in law.wanted)))
+    )
     known = (*dict.fromkeys((*signals, *law.signals, *references)), FEEDFORWARD, OUTPUT)
     for name, value in task.ranges.items():
         must_be_known("range", name, known)
-        positive(f"range.{name}", value, "the largest absolute value of a signal is a positive, finite number")
+        positive(
+            f"range.{name}", value, "the largest absolute value of a signal is a positive, finite number"
+        )
     limit = float(max(abs(dac[1:]))) if of.torque_range is None else of.torque_range
     usual = {"root_moment": of.moment_range, OUTPUT: limit if math.isfinite(limit) else None}
     ranges = {name: size for name, size in usual.items() if size} | dict(task.ranges)
@@ -269,7 +331,9 @@ def controller_of(law: Law, task: ExportTask) -> Controller:
 
 
 @compiled
-def run_real(table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, single: bool, outputs: Any, status: Any) -> None:
+def run_real(
+    table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, single: bool, outputs: Any, status: Any
+) -> None:
     """Fill outputs and status (n,) of inputs (n, k), the last of which is the feedforward; refused ones are left as 0.
 
     `table` is [A B; C D]; `plan` (columns, 2) has the two numbers whose difference is e of a column, by their places
@@ -289,7 +353,9 @@ def run_real(table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, single: boo
         status[k] = INPUT_ERROR
         if np.isfinite(inputs[k]).all():
             if hub[0] >= 0.0:
-                known[-2] = to_precision(estimate(known[int(hub[0])], 0.0, memory, True, hub[1], hub[2]), single)
+                known[-2] = to_precision(
+                    estimate(known[int(hub[0])], 0.0, memory, True, hub[1], hub[2]), single
+                )
             for j in range(plan.shape[0]):
                 z[n + j] = to_precision(known[plan[j, MINUEND]] - known[plan[j, SUBTRAHEND]], single)
             law_step(table, z, known[forward], single, following)
@@ -348,24 +414,38 @@ def template_values(task: ExportTask, controller: Controller, ports: Sequence[Po
     cast, zero = ("(int64_t)", "") if is_fixed else ("", f"0.0{suffix}")
     known = [*(f"{cast}input->{each.identifier}" for each in ports), f"({real})rate", zero]
     return {
-        "fixed": is_fixed, "real": real, "wide": "int64_t" if is_fixed else real, "largest": largest, "suffix": suffix,
-        "cast": cast, "fields": ports,
-        **self_test_values(controller.run, ports, task.precision), "header": FILES[0],
-        "n": word.law.order, "m": len(controller.plan), "shifts": word.shifts,
+        "fixed": is_fixed,
+        "real": real,
+        "wide": "int64_t" if is_fixed else real,
+        "largest": largest,
+        "suffix": suffix,
+        "cast": cast,
+        "fields": ports,
+        **self_test_values(controller.run, ports, task.precision),
+        "header": FILES[0],
+        "n": word.law.order,
+        "m": len(controller.plan),
+        "shifts": word.shifts,
         "table": [[literal(x, suffix) for x in row] for row in word.table.tolist()],
         "errors": [f"{known[of]} - {known[less]}".strip() for of, less in controller.plan.tolist()],
-        "converter": bool(np.isfinite(dac).all()), "delay": controller.delay, "step": dac.tolist()[0],
-        "dac": [literal(each, "") for each in dac.tolist()], "statuses": statuses(controller),
-        "hub": controller.hub and (ports[controller.signals.index(ANGLE)].identifier, *map(float.hex, controller.hub)),
+        "converter": bool(np.isfinite(dac).all()),
+        "delay": controller.delay,
+        "step": dac.tolist()[0],
+        "dac": [literal(each, "") for each in dac.tolist()],
+        "statuses": statuses(controller),
+        "hub": controller.hub
+        and (ports[controller.signals.index(ANGLE)].identifier, *map(float.hex, controller.hub)),
         "output": f"{arm.input} over {word.output!r} {unit}" if is_fixed else f"{arm.input} [{unit}]",
         "period": repr(task.case.chain.sampling.period),
-    }  # fmt: skip
+    }
 
 
 def statuses(controller: Controller) -> dict[str, int]:
     """What a step can return but 0, by the names in C."""
     if controller.word.precision == FIXED:
-        return {"SATURATED": SATURATED} | ({"STATE_SATURATED": STATE_SATURATED} if controller.word.law.order else {})
+        return {"SATURATED": SATURATED} | (
+            {"STATE_SATURATED": STATE_SATURATED} if controller.word.law.order else {}
+        )
     refused = {"INPUT_ERROR": INPUT_ERROR, "OVERFLOW": OVERFLOW}
     return refused | ({"SATURATED": SATURATED} if math.isfinite(controller.limits[1]) else {})
 
@@ -374,13 +454,19 @@ def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -
     """The inputs of the C function: signals, references, and the feedforward."""
     word = controller.word
     ranges = controller.ranges
-    steps = f", at most {ranges[RATE] * controller.hub[1]!r} a sample" if controller.hub and RATE in ranges else ""
+    steps = (
+        f", at most {ranges[RATE] * controller.hub[1]!r} a sample"
+        if controller.hub and RATE in ranges
+        else ""
+    )
     over = ", over {!r}".format if word.precision == FIXED else lambda size: ""
     found = []
     for title, names in zip(("", "reference of "), known, strict=True):
         for name, own in names.items():
             size = ranges.get(name, 1.0)
-            text = f"{title}{name} [{OUTPUTS[name.partition('@')[0]].unit}]{steps * (name == ANGLE)}{over(size)}"
+            text = (
+                f"{title}{name} [{OUTPUTS[name.partition('@')[0]].unit}]{steps * (name == ANGLE)}{over(size)}"
+            )
             found.append(Port(own, text, size))
     text = f"{FEEDFORWARD} [{task.case.arm.input_unit}]{over(word.output)}"
     return [*found, Port(FEEDFORWARD, text, word.feedforward)]

@@ -42,23 +42,36 @@ from tfarm.schema import Quantity
 CONSUMER = Consumer(
     "export fmu",
     acts=(
-        "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "law", "arithmetic",
-        "DAC steps", "DAC range", "torque limit", "hold", "delay", "hub damping", "plant",
+        "anti-alias filter",
+        "encoder",
+        "hub rate",
+        "amplifier steps",
+        "amplifier range",
+        "law",
+        "arithmetic",
+        "DAC steps",
+        "DAC range",
+        "torque limit",
+        "hold",
+        "delay",
+        "hub damping",
+        "plant",
     ),
     none=("reference", "volts"),
-)  # fmt: skip
+)
 
 COMPILERS = ("cc", "gcc", "clang")
-OPTIONS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")  # no fused operation
-LONGEST_COMPILATION = 60.0  # s
-PLATFORMS = {"linux": ("linux64", ".so"), "darwin": ("darwin64", ".dylib"), "win32": ("win64", ".dll")}
-LARGEST = sys.float_info.max  # of a range without limit
-LONGEST_TEXT = 400  # characters
-ERRORS = "logStatusError"  # category of messages
+# s
+LONGEST_COMPILATION = 60.0
+# characters
+LONGEST_TEXT = 400
+# category of messages
+ERRORS = "logStatusError"
 MEASURED = "measured:"
 AT = ("const fmi2ValueReference *", "size_t")
 ABSENT = "report(c, fmi2Error, __func__)"
-FUNCTIONS: tuple[tuple[str, tuple[str, ...], str], ...] = (  # of FMI in one statement: name, types of arguments, status
+# of FMI in one statement: name, types of arguments, status
+FUNCTIONS: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("SetDebugLogging", ("fmi2Boolean", "size_t", "const fmi2String *"), "fmi2OK"),
     ("SetupExperiment", ("fmi2Boolean", "fmi2Real", "fmi2Real", "fmi2Boolean", "fmi2Real"), "begin(c, a3)"),
     ("EnterInitializationMode", (), "fmi2OK"),
@@ -109,9 +122,13 @@ class Variable(NamedTuple):
 class Unit:
     """A functional mock-up unit: its variables in the order of their references, flexible modes, and binary."""
 
-    variables: Annotated[list[Variable], Quantity("variables", help="variables of the functional mock-up unit")]
+    variables: Annotated[
+        list[Variable], Quantity("variables", help="variables of the functional mock-up unit")
+    ]
     modes: Annotated[int | None, MODES_USED]
-    binary: Annotated[str, Quantity("binary", help="platform and compiler of the binary, or the reason for none")]
+    binary: Annotated[
+        str, Quantity("binary", help="platform and compiler of the binary, or the reason for none")
+    ]
 
 
 class LawCode(NamedTuple):
@@ -138,11 +155,15 @@ def fmu(task: ExportTask) -> Export:
     period = repr(float(task.case.chain.sampling.period))
     about = f"{task.what} of {task.case.arm.name}, sampled every {period} s{verdict and f': {verdict}'}"
     modes = prepared.plant.count if has_plant else None
-    guid = hashlib.sha256(repr((task.sha256, name, about, modes, variables, version("tfarm"))).encode()).hexdigest()
+    guid = hashlib.sha256(
+        repr((task.sha256, name, about, modes, variables, version("tfarm"))).encode()
+    ).hexdigest()
     head: dict[str, Any] = {"variables": variables, "has_plant": has_plant, "period": period, "about": about}
     head["guid"] = guid[:32]
     plant = plant_code(prepared)
-    source = render_source("fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, sha256=task.sha256, **head, **plant)
+    source = render_source(
+        "fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, sha256=task.sha256, **head, **plant
+    )
     sources = {"fmi2.h": render_source("fmi2.h"), "fmu.c": source, **(law.files if law else {})}
     binary, compiler = binary_of(sources, own[name])
     files = {f"sources/{name}": content for name, content in sources.items()} | binary
@@ -184,7 +205,8 @@ def prepared_simulator(task: ExportTask) -> Simulator:
     case = task.case.under(replace(task.case.law, delay=0.0)) if task.what == "plant" else task.case
     try:
         run = scenario("slew", case.arm, case.chain, TRIAL_DURATION)
-    except ParameterError:  # an arm that cannot turn
+    except ParameterError:
+        # an arm that cannot turn
         run = scenario("step", case.arm, case.chain, TRIAL_DURATION)
     modes = 1 if task.what == "controller" else simulate_modes(case, run)[1].modes
     return Simulator(case, run, count=modes)
@@ -220,6 +242,8 @@ def variables_of(what: What, of: Simulator) -> list[Variable]:
 
 def plant_code(of: Simulator) -> dict[str, Any]:
     """The numbers of the plant in its template."""
+    # of a range without limit
+    largest = sys.float_info.max
     chain = of.electronics
     model = of.model
     tables = {
@@ -229,13 +253,17 @@ def plant_code(of: Simulator) -> dict[str, Any]:
         "weights[OUTPUTS - 1][POLES][2]": real_and_imaginary(model.weights),
         "rates[OUTPUTS - 1][2]": model.rates,
         "through[OUTPUTS - 1]": model.static,
-        "converters[3][3]": np.clip(chain.quantisers, -LARGEST, LARGEST),
+        "converters[3][3]": np.clip(chain.quantisers, -largest, largest),
     }
     return {
         "tables": {name: braces(values) for name, values in tables.items()},
-        "poles": of.kept.size, "pieces": len(model.piece), "ring": chain.delay + 2, "bound": repr(chain.bound),
-        "lag": literal(chain.pole), "is_differenced": chain.is_differenced,
-    }  # fmt: skip
+        "poles": of.kept.size,
+        "pieces": len(model.piece),
+        "ring": chain.delay + 2,
+        "bound": repr(chain.bound),
+        "lag": literal(chain.pole),
+        "is_differenced": chain.is_differenced,
+    }
 
 
 def real_and_imaginary(values: Complex) -> Real:
@@ -252,9 +280,15 @@ def braces(values: Any) -> str:
 
 
 def model_description(
-    sources: Iterable[str], identifier: str, *, variables: Sequence[Variable], has_plant: bool, period: str, about: str,
+    sources: Iterable[str],
+    identifier: str,
+    *,
+    variables: Sequence[Variable],
+    has_plant: bool,
+    period: str,
+    about: str,
     guid: str,
-) -> bytes:  # fmt: skip
+) -> bytes:
     """The file modelDescription.xml: at a communication point outputs of a plant depend on no input there."""
     outputs = [str(n) for n, each in enumerate(variables, 1) if each.causality == "output"]
     known = {"dependencies": ""} if has_plant else {}
@@ -267,17 +301,27 @@ def model_description(
     root = element(
         "fmiModelDescription",
         element(
-            "CoSimulation", element("SourceFiles", *files), modelIdentifier=identifier,
-            canHandleVariableCommunicationStepSize="true", canNotUseMemoryManagementFunctions="true",
+            "CoSimulation",
+            element("SourceFiles", *files),
+            modelIdentifier=identifier,
+            canHandleVariableCommunicationStepSize="true",
+            canNotUseMemoryManagementFunctions="true",
         ),
         element("UnitDefinitions", *units),
         element("LogCategories", element("Category", name=ERRORS)),
         element("DefaultExperiment", startTime="0", stopTime=repr(TRIAL_DURATION), stepSize=period),
-        element("ModelVariables", *(variable_element(n, each, has_plant) for n, each in enumerate(variables))),
+        element(
+            "ModelVariables", *(variable_element(n, each, has_plant) for n, each in enumerate(variables))
+        ),
         element("ModelStructure", *structure),
-        fmiVersion="2.0", modelName=identifier, guid=guid, description=one_line(about, LONGEST_TEXT),
-        generationTool=f"tfarm {version('tfarm')}", variableNamingConvention="flat", numberOfEventIndicators="0",
-    )  # fmt: skip
+        fmiVersion="2.0",
+        modelName=identifier,
+        guid=guid,
+        description=one_line(about, LONGEST_TEXT),
+        generationTool=f"tfarm {version('tfarm')}",
+        variableNamingConvention="flat",
+        numberOfEventIndicators="0",
+    )
     indent(root)
     return tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
 
@@ -287,10 +331,15 @@ def variable_element(reference: int, of: Variable, has_plant: bool) -> Element:
     is_computed = of.causality == "output" and has_plant
     initial = {"initial": "calculated" if has_plant else "exact"} if of.causality == "output" else {}
     return element(
-        "ScalarVariable", element("Real", unit=of.unit, **({} if is_computed else {"start": "0"})),
-        name=of.name, valueReference=str(reference), description=of.description, causality=of.causality,
-        variability="fixed" if of.causality == "parameter" else "discrete", **initial,
-    )  # fmt: skip
+        "ScalarVariable",
+        element("Real", unit=of.unit, **({} if is_computed else {"start": "0"})),
+        name=of.name,
+        valueReference=str(reference),
+        description=of.description,
+        causality=of.causality,
+        variability="fixed" if of.causality == "parameter" else "discrete",
+        **initial,
+    )
 
 
 def element(tag: str, *children: Element, **attributes: str) -> Element:
@@ -302,19 +351,32 @@ def element(tag: str, *children: Element, **attributes: str) -> Element:
 
 def binary_of(sources: Mapping[str, bytes], identifier: str) -> tuple[dict[str, bytes], str]:
     """The binary for this machine by its path in a unit, none without a compiler; and platform and compiler."""
+    # no fused operation
+    options = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
+    platforms = {"linux": ("linux64", ".so"), "darwin": ("darwin64", ".dylib"), "win32": ("win64", ".dll")}
     compiler = next(filter(None, map(shutil.which, COMPILERS)), None)
-    if compiler is None or sys.platform not in PLATFORMS:
+    if compiler is None or sys.platform not in platforms:
         return {}, f"none: no compiler found ({', '.join(COMPILERS)})"
-    platform, suffix = PLATFORMS[sys.platform]
+    platform, suffix = platforms[sys.platform]
     with temporary_folder(Path(tempfile.gettempdir())) as folder:
         for name, content in sources.items():
             (folder / name).write_bytes(content)
-        command = [compiler, *OPTIONS, "-o", f"unit{suffix}", *(name for name in sources if name.endswith(".c"))]
+        command = [
+            compiler,
+            *options,
+            "-o",
+            f"unit{suffix}",
+            *(name for name in sources if name.endswith(".c")),
+        ]
         try:
             subprocess.run(
-                command, cwd=folder, check=True, timeout=LONGEST_COMPILATION, capture_output=True,
+                command,
+                cwd=folder,
+                check=True,
+                timeout=LONGEST_COMPILATION,
+                capture_output=True,
                 stdin=subprocess.DEVNULL,
-            )  # fmt: skip
+            )
             binary = (folder / f"unit{suffix}").read_bytes()
         except (OSError, subprocess.SubprocessError) as error:
             return {}, f"none: {one_line(f'{compiler}: {error}', LONGEST_TEXT)}"

@@ -52,12 +52,26 @@ from tfarm.spectrum.gains import angle_unit, default_gains
 CONSUMER = Consumer(
     "live page",
     acts=(
-        "reference", "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "law",
-        "arithmetic", "DAC steps", "DAC range", "torque limit", "hold", "delay", "hub damping", "plant",
+        "reference",
+        "anti-alias filter",
+        "encoder",
+        "hub rate",
+        "amplifier steps",
+        "amplifier range",
+        "law",
+        "arithmetic",
+        "DAC steps",
+        "DAC range",
+        "torque limit",
+        "hold",
+        "delay",
+        "hub damping",
+        "plant",
     ),
     none=("volts",),
-)  # fmt: skip
-LIVE_COLUMNS = 90  # values of the gain across at which the continuous region is cut
+)
+# values of the gain across at which the continuous region is cut
+LIVE_COLUMNS = 90
 LiveNumbers = dict[str, Any]
 
 
@@ -135,7 +149,9 @@ def _of_parts(case: Case) -> LiveNumbers:
         "rows": [[place, 0] for place in range(1, 1 + len(gains))],
         "of_law": {
             "head": law_toml(law).partition("\n\n")[0],
-            "parts": [{"name": name, "signal": of, "num": each.num, "den": each.den} for name, of, each in blocks],
+            "parts": [
+                {"name": name, "signal": of, "num": each.num, "den": each.den} for name, of, each in blocks
+            ],
         },
         "units": dict.fromkeys(gains, "1"),
         # without 0, at which poles may join those at s = 0
@@ -207,14 +223,20 @@ def _graded(case: Case, corners: Sequence[Case], unit: Law | None) -> LiveNumber
     C = reference_damping(case.arm)
     damped = case.arm.having(damping=C)
     samples, _ = _samples(case.on(damped), [each.on(damped) for each in corners], unit)
-    return samples | {"kind": "band", "sampled_loop": _in_page(case.on(damped), unit), "words": UNDAMPED.format(C)}
+    return samples | {
+        "kind": "band",
+        "sampled_loop": _in_page(case.on(damped), unit),
+        "words": UNDAMPED.format(C),
+    }
 
 
 def _known(arm: Arm, is_quiet: bool, are_gains: bool) -> LiveNumbers:
     """Return theorems on gains at the hub, bounds beyond the frequency range, and the static balance."""
     is_reactive = are_gains and arm.is_reactive
     kind = "reactive" if is_reactive else "quiet" if is_quiet else "band"
-    beyond = "|L| < 0.5 beyond the frequency range at all gains of this page: no unstable pole there (small gain)"
+    beyond = (
+        "|L| < 0.5 beyond the frequency range at all gains of this page: no unstable pole there (small gain)"
+    )
     if are_gains and kind != "quiet":
         beyond = (
             "C = 0: no mode of the frequency range is driven; not determined beyond"
@@ -236,7 +258,9 @@ def _known(arm: Arm, is_quiet: bool, are_gains: bool) -> LiveNumbers:
 
 def _stable_moments(arm: Arm) -> list[float | None]:
     """Return between which K2 no mode is driven by K1 > 0 without damping; None where no limit was found."""
-    found = windows_of(stability(Case(arm, default_gains(arm).having(MOMENT_GAIN, 0.0))), [MOMENT_GAIN])[MOMENT_GAIN]
+    found = windows_of(stability(Case(arm, default_gains(arm).having(MOMENT_GAIN, 0.0))), [MOMENT_GAIN])[
+        MOMENT_GAIN
+    ]
     return [end if found.end(end) == "edge" else None for end in found.around or (-math.inf, math.inf)]
 
 
@@ -291,7 +315,13 @@ def law_in_page(loop: Sampled, names: Sequence[str]) -> LiveNumbers:
         "ones": max(0, *(orders[row] - int((zeros == 0).sum()) for _, row, _, zeros in in_z.columns)),
         "modes": loop.plant.count,
         "columns": [
-            {"name": names[n], "row": row, "g": g, "zeros": _pairs(zeros), "poles": _pairs(in_z.part_poles[n])}
+            {
+                "name": names[n],
+                "row": row,
+                "g": g,
+                "zeros": _pairs(zeros),
+                "poles": _pairs(in_z.part_poles[n]),
+            }
             for n, row, g, zeros in in_z.columns
         ],
     }
@@ -353,7 +383,9 @@ def slew_numbers(case: Case) -> LiveNumbers | None:
             **_plant(plant),
             **_shapes(arm, plant),
             "ideal": pack_doubles(np.stack(signals, axis=1)),
-            "converters": [[x if math.isfinite(x) else None for x in row] for row in quantisers(chain).tolist()],
+            "converters": [
+                [x if math.isfinite(x) else None for x in row] for row in quantisers(chain).tolist()
+            ],
             "single": chain.converters.is_single,
             "bound": FOLDED_UP * arm.bending_scale,
             "rise": task.busy_until,
@@ -384,7 +416,9 @@ def _shapes(arm: Arm, plant: Plant) -> LiveNumbers:
     # off poles of both outputs; the ratio is off by as much
     s = plant.poles.astype(complex) * (1 + 1e-9)
     x = np.linspace(0.0, arm.length, 25)
-    shapes = [np.divide(*transfer(arm, ["displacement", "tip_displacement"], x=each)(s)) for each in x.tolist()]
+    shapes = [
+        np.divide(*transfer(arm, ["displacement", "tip_displacement"], x=each)(s)) for each in x.tolist()
+    ]
     return {"x": x.tolist(), "offset": arm.reach - arm.length, "shapes": pack_doubles(shapes)}
 
 

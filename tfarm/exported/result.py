@@ -126,7 +126,9 @@ class Export:
     form: Annotated[str, Quantity("form", help="c, fmu, mat or py")]
     contents: Mapping[str, bytes] = field(repr=False)
     names: Annotated[list[Name], Quantity("names", help="identifiers of names in the exported files")]
-    verdict: Annotated[str, Quantity("stability", help="stability of the loop as exported, with its certainty")]
+    verdict: Annotated[
+        str, Quantity("stability", help="stability of the loop as exported, with its certainty")
+    ]
     details: Annotated[Any, Quantity(flat=True, help="numbers of the form of the export")]
     sha256: Annotated[str, Quantity("SHA-256 of the inputs", help="hash of arm, chain, law and tuner")]
 

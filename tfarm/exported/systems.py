@@ -143,7 +143,9 @@ def loop_system(plant: NamedSystem, controller: NamedSystem) -> NamedSystem:
 def reduced_system(reduced: ReducedModel, outputs: tuple[str, ...]) -> NamedSystem:
     """Return the continuous-time reduced model under these names of its outputs, with its worst error."""
     facts = {"worst_error": reduced.worst_error, "band": np.array(reduced.band)}
-    return NamedSystem(reduced.name, reduced.matrices(), (reduced.input,), outputs, reduced.states, facts=facts)
+    return NamedSystem(
+        reduced.name, reduced.matrices(), (reduced.input,), outputs, reduced.states, facts=facts
+    )
 
 
 def reduced_systems(arm: Arm, names: tuple[str, ...]) -> dict[str, NamedSystem]:
@@ -159,7 +161,9 @@ def reduced_systems(arm: Arm, names: tuple[str, ...]) -> dict[str, NamedSystem]:
         x = share * arm.length if along else None
         order = modal_model(arm, outputs, USUAL_MODES, x).order
         reduced = reduce(arm, outputs, order=order, method="modal", x=x)
-        found[f"reduced_{n + 1}" if n else "reduced"] = reduced_system(reduced, tuple(name for name, _, _ in here))
+        found[f"reduced_{n + 1}" if n else "reduced"] = reduced_system(
+            reduced, tuple(name for name, _, _ in here)
+        )
     return found
 
 
@@ -216,7 +220,9 @@ def linear(task: ExportTask) -> Linear:
     systems = {"plant": plant, **reduced_systems(read.arm, read.names)}
     if what == "loop":
         systems = {what: loop_system(plant, controller), "controller": controller, **systems}
-    return Linear(systems, head, response_data(read.arm, case.arm.input, read.names, BAND, read.values), verdict)
+    return Linear(
+        systems, head, response_data(read.arm, case.arm.input, read.names, BAND, read.values), verdict
+    )
 
 
 def mat(task: ExportTask) -> Export:
@@ -263,11 +269,17 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
     is_file = os.path.isfile(path) or not os.path.exists(path)
     require(is_file, key, str(path), "is no regular file, and its script needs a folder")
     path = path if path.suffix == ".mat" else path.with_name(path.name + ".mat")
-    require(comment(path.name) == path.name, key, path.name, "a name of printable ASCII, as its script contains it")
+    require(
+        comment(path.name) == path.name,
+        key,
+        path.name,
+        "a name of printable ASCII, as its script contains it",
+    )
     contents = {path.with_name(name): content for name, content in mat_files(path.name, of).items()}
     other = next(reversed(contents))
     text = ""
-    with suppress(OSError):  # a file that cannot be read is not ours
+    # a file that cannot be read is not ours
+    with suppress(OSError):
         text = other.read_text("utf-8", errors="replace")
     # as in the first line of every script, load.m
     is_ours = not os.path.exists(other) or ("written by tfarm" in text and matlab_text(path.name) in text)

@@ -15,8 +15,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from tfarm.schema import entries, text
 
-LONGEST_IDENTIFIER = 31  # characters of an identifier that C99 compares
-LONGEST_NAME = 16  # of identifiers in C, before "_step" and the like
+# characters of an identifier that C99 compares
+LONGEST_IDENTIFIER = 31
 
 
 def identifiers(names: Iterable[str], prefix: str, longest: int = LONGEST_IDENTIFIER) -> dict[str, str]:
@@ -28,7 +28,10 @@ def identifiers(names: Iterable[str], prefix: str, longest: int = LONGEST_IDENTI
     taken: set[str] = set()
     for name in dict.fromkeys(names):
         plain = f"{prefix}{re.sub(r'[^A-Za-z0-9]+', '_', name).strip('_') or 'unnamed'}"
-        tries = (plain[:longest], *(f"{plain[: longest - 1 - len(str(n))]}_{n}" for n in range(2, len(found) + 3)))
+        tries = (
+            plain[:longest],
+            *(f"{plain[: longest - 1 - len(str(n))]}_{n}" for n in range(2, len(found) + 3)),
+        )
         found[name] = next(each for each in tries if each.lower() not in taken)
         taken.add(found[name].lower())
     return found
@@ -37,7 +40,9 @@ def identifiers(names: Iterable[str], prefix: str, longest: int = LONGEST_IDENTI
 def comment(words: str) -> str:
     """Return one line of printable ASCII that ends no comment of C and continues none."""
     plain = unicodedata.normalize("NFKD", words)
-    line = "".join(c if " " <= c <= "~" else " " if c.isspace() else "?" for c in plain if not unicodedata.combining(c))
+    line = "".join(
+        c if " " <= c <= "~" else " " if c.isspace() else "?" for c in plain if not unicodedata.combining(c)
+    )
     # marks of C, and the trigraph of a backslash
     for mark, instead in (("\\", "|"), ("*/", "* /"), ("/*", "/ *"), ("??/", "? ?/")):
         line = line.replace(mark, instead)
@@ -51,8 +56,10 @@ def matlab_text(words: str) -> str:
 
 def name_in_c(wanted: str) -> dict[str, str]:
     """Return the name that the identifiers of a file in C begin with, by the wanted one."""
+    # of identifiers in C, before "_step" and the like
+    longest_name = 16
     prefix = "" if wanted[:1].isascii() and wanted[:1].isalpha() else "n_"
-    return identifiers([wanted], prefix, LONGEST_NAME)
+    return identifiers([wanted], prefix, longest_name)
 
 
 def literal(value: float, suffix: str = "") -> str:
@@ -65,9 +72,13 @@ def source_templates() -> Environment:
     """The templates of source files, without the escapes of HTML."""
     folder = Path(__file__).parent / "templates"
     environment = Environment(
-        loader=FileSystemLoader(folder), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-        keep_trailing_newline=True, autoescape=False,
-    )  # fmt: skip
+        loader=FileSystemLoader(folder),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
     environment.filters["comment"] = comment
     return environment
 
@@ -80,6 +91,7 @@ def render_source(template: str, **values: Any) -> bytes:
 def facts_of(record: Any) -> list[tuple[str, str]]:
     """The entries of a record that have one value, by label with unit, for a comment."""
     rows = (
-        (f"{label} [{of.unit}]" if of.unit else label, text(value, of.digits)) for label, of, value in entries(record)
+        (f"{label} [{of.unit}]" if of.unit else label, text(value, of.digits))
+        for label, of, value in entries(record)
     )
     return [(label, shown) for label, shown in rows if shown]

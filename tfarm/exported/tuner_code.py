@@ -48,17 +48,28 @@ from tfarm.tuner.trial import TRIAL_MODES, SavedTuner, load_tuner
 CONSUMER = Consumer(
     "export c of a tuner",
     acts=("anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
-    named=("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit", "arithmetic"),
+    named=(
+        "encoder",
+        "amplifier steps",
+        "amplifier range",
+        "DAC steps",
+        "DAC range",
+        "torque limit",
+        "arithmetic",
+    ),
     none=("reference", "volts"),
 )
 
-ULPS = 1.5  # bound of the error of e^x, x from `lowest` to 0
-LN_2 = Fraction(math.log(2.0)) + Fraction(2319046813846299558, 10**35)  # 35 digits: math.log(2) and its remainder
+# bound of the error of e^x, x from `lowest` to 0
+ULPS = 1.5
+# 35 digits: math.log(2) and its remainder
+LN_2 = Fraction(math.log(2.0)) + Fraction(2319046813846299558, 10**35)
 
 ANGLE, RATE, MOMENT, WANTED_ANGLE, WANTED_RATE, WANTED_MOMENT = range(6)
-FORWARD = -1
-U, E, X, K, E_BEFORE, TORQUE = range(6)  # places of the state: the last sample, and e of the one before
-ZERO, ONE = np.array([0.0, 1.0], np.float32)  # exact, and of either precision with another number
+# places of the state: the last sample, and e of the one before
+U, E, X, K, E_BEFORE, TORQUE = range(6)
+# exact, and of either precision with another number
+ZERO, ONE = np.array([0.0, 1.0], np.float32)
 
 
 class TunerConstants(NamedTuple):
@@ -106,7 +117,12 @@ def constants_of_tuner(saved: SavedTuner, real: Any) -> TunerConstants:
     hi = np.nextafter(hi, real(0.0)) if float(hi) > limits.hi else hi
     usable = [*(np.isfinite(each).all() for each in rounded), scales.all(), lo < hi]
     for name, is_usable in zip((*names, "scales", "guard"), usable, strict=True):
-        require(is_usable, name, getattr(saved, name), "beyond the range or the digits of float: export it in double")
+        require(
+            is_usable,
+            name,
+            getattr(saved, name),
+            "beyond the range or the digits of float: export it in double",
+        )
     share = float(scales.min()) / (2 * scales.size * max(1.0, float(abs(W1).max())))
     largest = real(min(1.0, share) * float(np.finfo(real).max))
     own = taylor, W1, w2, scales, real(K1), real(Kp), lo, hi, largest, saved.signals == "total"
@@ -131,7 +147,8 @@ def exponential(x: float, of: TunerConstants) -> float:
     result = evaluate_polynomial((x - k * of.high) - k * of.low, of.taylor)
     power = of.half
     n = int(-k)
-    while n > 0:  # at most ten times
+    # at most ten times
+    while n > 0:
         if n % 2 == 1:
             result *= power
         power *= power
@@ -155,23 +172,25 @@ def network_output(of: TunerConstants, row: Real) -> float:
         for i in range(of.scales.size):
             net += of.W1[j, i] * (row[i] / of.scales[i])
         z += of.w2[j] * sigmoid(net, of)
-    gain = of.lo + (of.hi - of.lo) * sigmoid(z, of)  # not below lo; above hi by rounding
+    # not below lo; above hi by rounding
+    gain = of.lo + (of.hi - of.lo) * sigmoid(z, of)
     return of.hi if gain > of.hi else gain
 
 
 @inlined
 def advance_sample(of: TunerConstants, state: Real, inputs: Real) -> int:
     """Advance by one sample; return 0, or the kind of an error."""
+    forward = -1
     for value in inputs:
         if not -of.largest <= value <= of.largest:
             return INPUT_ERROR
     x = inputs[MOMENT] if of.is_total else inputs[MOMENT] - inputs[WANTED_MOMENT]
     servo = of.Kp * (inputs[WANTED_ANGLE] - inputs[ANGLE]) + of.K1 * (inputs[WANTED_RATE] - inputs[RATE])
-    u = servo + inputs[FORWARD] if of.is_total else servo
+    u = servo + inputs[forward] if of.is_total else servo
     row = np.array([u, state[U], state[E], state[E_BEFORE], x, state[X], state[K]])
     gain = network_output(of, row)
     e = u - gain * x
-    torque = (inputs[FORWARD] + servo) - gain * x
+    torque = (inputs[forward] + servo) - gain * x
     for value in (u, e, x, gain, torque):
         if not -of.largest <= value <= of.largest:
             return OVERFLOW
@@ -192,7 +211,8 @@ def advance_rows(of: TunerConstants, state: Real, inputs: Real, torque: Real, st
         torque[k] = state[TORQUE]
 
 
-INPUTS = {  # by identifier in C: the field of a `Measurement`, the meaning, and the unit ("": that of the arm's input)
+# by identifier in C: the field of a `Measurement`, the meaning, and the unit ("": that of the arm's input)
+INPUTS = {
     "y_hub_angle": ("hub_angle", "hub angle", "rad"),
     "y_hub_rate": ("hub_rate", "hub rate", "rad/s"),
     "y_root_moment": ("root_moment", "root moment", "N m"),
@@ -214,7 +234,9 @@ class ExportedTuner:
         self.real, _ = FLOATS[precision]
         self.scale = saved.scales[0]
         self.numbers = constants_of_tuner(saved, self.real)
-        self.inputs = {key: of for key, of in INPUTS.items() if not (self.numbers.is_total and key == "r_root_moment")}
+        self.inputs = {
+            key: of for key, of in INPUTS.items() if not (self.numbers.is_total and key == "r_root_moment")
+        }
         self.reset()
 
     def reset(self) -> None:
@@ -244,7 +266,9 @@ def c_tuner(task: ExportTask) -> Export:
     is not certified to vary in its guard on this arm.
     """
     if task.tuned is None:
-        raise ParameterError(key="tuned", value=MISSING, remedy="give the file of tfarm tune ARM --save FILE.json")
+        raise ParameterError(
+            key="tuned", value=MISSING, remedy="give the file of tfarm tune ARM --save FILE.json"
+        )
     case = task.case
     saved = load_tuner(task.tuned, "tuned")
     period = case.chain.sampling.period
@@ -259,12 +283,16 @@ def c_tuner(task: ExportTask) -> Export:
     remedy = f"on this arm the gain is {certainty}; --anyway exports it"
     require(is_proven or task.anyway, "tuned", str(task.tuned), remedy)
     facts = {
-        "arm": case.arm.name, "tuner": f"trained on {saved.arm}", **({} if is_proven else {"warning": ANYWAY}),
-        "sampling period": f"{period!r} s", "moment gain": certainty,
+        "arm": case.arm.name,
+        "tuner": f"trained on {saved.arm}",
+        **({} if is_proven else {"warning": ANYWAY}),
+        "sampling period": f"{period!r} s",
+        "moment gain": certainty,
         "network": f"{of.scales.size}-{of.w2.size}-1, {task.precision}",
         "SHA-256 of the tuner": hashlib.sha256(task.tuned.read_bytes()).hexdigest(),
-        "SHA-256 of the inputs": task.sha256, "tfarm": version("tfarm"),
-    }  # fmt: skip
+        "SHA-256 of the inputs": task.sha256,
+        "tfarm": version("tfarm"),
+    }
     name = name_in_c(task.name or "tuner")
     (own,) = name.values()
     return task.exported(tuner_files(task, tuner, own, facts), names_of(name), certainty)
@@ -280,14 +308,24 @@ def tuner_files(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[s
         for key, (_, meaning, unit) in tuner.inputs.items()
     ]
     values = {
-        "name": name, "facts": list(facts.items()), "fixed": False, "real": real, "suffix": suffix, "header": "tuner.h",
-        "bounds": (), "statuses": {"INPUT_ERROR": INPUT_ERROR, "OVERFLOW": OVERFLOW},
-        "fields": ports, "output": f"{task.case.arm.input} [{task.case.arm.input_unit}]", "of": of, "ulps": ULPS,
+        "name": name,
+        "facts": list(facts.items()),
+        "fixed": False,
+        "real": real,
+        "suffix": suffix,
+        "header": "tuner.h",
+        "bounds": (),
+        "statuses": {"INPUT_ERROR": INPUT_ERROR, "OVERFLOW": OVERFLOW},
+        "fields": ports,
+        "output": f"{task.case.arm.input} [{task.case.arm.input_unit}]",
+        "of": of,
+        "ulps": ULPS,
         "scalars": {key: literal(float(x), suffix) for key, x in kept.items() if isinstance(x, np.floating)},
         "tables": {
             key: [literal(x, suffix) for x in each.ravel().tolist()]
-            for key, each in kept.items() if isinstance(each, np.ndarray)
+            for key, each in kept.items()
+            if isinstance(each, np.ndarray)
         },
         **self_test_values(tuner.run, ports, task.precision),
-    }  # fmt: skip
+    }
     return {file: render_source(file, **values) for file in ("tuner.h", "tuner.c", "self_test.c")}

@@ -41,33 +41,43 @@ from tfarm.exact.rationals import exact_matrix
 from tfarm.loop.sampled import Sampled
 from tfarm.schema import Quantity
 
-MOST_DOUBLINGS = 40  # of the samples that a sum has: 1e12 of them
-SUMMED = 1e-9  # of a sum of squares: its last terms
-LEAST_SHARE = 1e-12  # of the largest singular value: below it a state is not controllable or not observable
+# of a sum of squares: its last terms
+SUMMED = 1e-9
+# of the largest singular value: below it a state is not controllable or not observable
+LEAST_SHARE = 1e-12
 GIVEN = "law as given"
 SECTIONS = "second-order sections"
 BALANCED = "balanced state space"
 # samples of a sum without a bound on all others, and of one step
 MOST_SUMMED = 20_000
 BLOCK = 32
-FRACTION_BITS = 31  # of a number in fixed point
-HALF_STEP = 2.0 ** -(FRACTION_BITS + 1)  # of the range of a number: its largest rounding
-LEAST_SCALE = 2.0**-100  # of the range of a state
+# of a number in fixed point
+FRACTION_BITS = 31
+# of the range of a number: its largest rounding
+HALF_STEP = 2.0 ** -(FRACTION_BITS + 1)
 # fixed point; names of u and of r among ranges
 FIXED = "q31"
 OUTPUT = "output"
 FEEDFORWARD = "feedforward"
 RATE = "hub_rate"
 ANGLE = "hub_angle"
-FLOATS: dict[str, tuple[Any, float]] = {"double": (np.float64, 2.0**-53), "float": (np.float32, 2.0**-24)}  # roundoff
+# roundoff
+FLOATS: dict[str, tuple[Any, float]] = {"double": (np.float64, 2.0**-53), "float": (np.float32, 2.0**-24)}
 
 
 class NoiseGain(NamedTuple):
     """A realisation and its noise gain."""
 
     realisation: Annotated[str, Quantity("realisation", help="structure of the states of the controller")]
-    gain: Annotated[float | None, Quantity("noise gain", "", 5,
-            help="variance of the output by roundings, for states of unit variance, in the closed loop")]  # fmt: skip
+    gain: Annotated[
+        float | None,
+        Quantity(
+            "noise gain",
+            "",
+            5,
+            help="variance of the output by roundings, for states of unit variance, in the closed loop",
+        ),
+    ]
 
 
 class WordLengthBounds(NamedTuple):
@@ -105,7 +115,9 @@ def with_system_matrix(law: Law, S: Real) -> Law:
     return replace(law, parts=(part,), sign=-1)
 
 
-def close_state_space(A: Real, B: Real, C: Real, a: Real, b: Real, c: Real, d: Real) -> tuple[Real, Real, Real]:
+def close_state_space(
+    A: Real, B: Real, C: Real, a: Real, b: Real, c: Real, d: Real
+) -> tuple[Real, Real, Real]:
     """Matrix, rows of y and row of u of the loop of x' = A x + B u, y = C x and k' = a k + b y, u = c k + d y."""
     y = np.pad(C, ((0, 0), (0, len(a))))
     u = np.c_[d @ C, c]
@@ -131,8 +143,10 @@ def close_around_law(law: Law, loop: Sampled) -> StateSpaceLoop:
 
 def gramian_sum(M: Real, Q: Real, rows: slice) -> Real | None:
     """Q + M Q M^T + M^2 Q M^2^T + ...; None where the sum of these rows does not converge."""
+    # of the samples that a sum has: 1e12 of them
+    most_doublings = 40
     with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(MOST_DOUBLINGS):
+        for _ in range(most_doublings):
             more = M @ Q @ M.T
             Q = Q + more
             M = M @ M
@@ -165,11 +179,13 @@ def second_order_sections(A: Real, K: Real, W: Real) -> Real | None:
     # poles are not separated
     if np.linalg.cond(modal / np.linalg.norm(modal, axis=0)) > 1e8:
         return None
-    begins = np.flatnonzero(poles.imag >= 0)[1:]  # of a section, after the first
+    # of a section, after the first
+    begins = np.flatnonzero(poles.imag >= 0)[1:]
     blocks = np.split(modal, begins, axis=1)
     duals = np.split(np.linalg.inv(modal), begins)
     own = [
-        balancing_transform(dual @ K @ dual.T, block.T @ W @ block) for block, dual in zip(blocks, duals, strict=True)
+        balancing_transform(dual @ K @ dual.T, block.T @ W @ block)
+        for block, dual in zip(blocks, duals, strict=True)
     ]
     known = [each for each in own if each is not None]
     return modal @ block_diag(*known) if len(known) == len(own) else None
@@ -183,7 +199,11 @@ def candidates(law: Law, loop: Sampled) -> list[tuple[NoiseGain, Real]]:
     if found is None:
         return [(NoiseGain(GIVEN, None if n else 0.0), S)]
     K, W = found
-    changes = {GIVEN: np.eye(n), SECTIONS: second_order_sections(S[:n, :n], K, W), BALANCED: balancing_transform(K, W)}
+    changes = {
+        GIVEN: np.eye(n),
+        SECTIONS: second_order_sections(S[:n, :n], K, W),
+        BALANCED: balancing_transform(K, W),
+    }
     known = [(name, T, np.linalg.inv(T)) for name, T in changes.items() if T is not None]
     gains = [abs(float(np.diag(inverse @ K @ inverse.T) @ np.diag(T.T @ W @ T))) for _, T, inverse in known]
     return [(NoiseGain(name, gain), similar(S, T)) for gain, (name, T, _) in zip(gains, known, strict=True)]
@@ -201,7 +221,9 @@ def least_noise(law: Law, loop: Sampled) -> tuple[Law, str, list[NoiseGain]]:
     """The law in the realisation of least noise, as given if that has hardly more; its name, and all noise gains."""
     found = candidates(law, loop)
     # for a hundredth less a law keeps its states, and an integral its pole z = 1
-    best, S = min(found, key=lambda each: (each[0].gain or 0.0) * (1.01 if each[0].realisation != GIVEN else 1.0))
+    best, S = min(
+        found, key=lambda each: (each[0].gain or 0.0) * (1.01 if each[0].realisation != GIVEN else 1.0)
+    )
     return with_system_matrix(law, S), best.realisation, [gain for gain, _ in found]
 
 
@@ -212,7 +234,8 @@ def absolute_sum(M: Real, left: Real, right: Real, most: int = MOST_SUMMED) -> t
     """
     G = np.zeros(left.shape)
     S = np.zeros((len(left), right.shape[1]))
-    with np.errstate(over="ignore", invalid="ignore"):  # of a matrix that grows
+    # of a matrix that grows
+    with np.errstate(over="ignore", invalid="ignore"):
         block = np.array([left @ np.linalg.matrix_power(M, k) for k in range(BLOCK)])
         step = last = np.linalg.matrix_power(M, BLOCK)
         for _ in range(most // BLOCK):
@@ -252,7 +275,11 @@ class Word:
         S = np.asarray(self.table, dtype=float)
         one = np.ones(self.law.order)
         if self.precision == FIXED:
-            S = np.ldexp(S, -self.shifts[:, None]) * np.r_[one, self.output][:, None] / np.r_[one, self.ranges]
+            S = (
+                np.ldexp(S, -self.shifts[:, None])
+                * np.r_[one, self.output][:, None]
+                / np.r_[one, self.ranges]
+            )
         return with_system_matrix(self.law, S)
 
     @cached_property
@@ -284,8 +311,11 @@ class Word:
         relative += (3 if self.precision == FIXED else 1) * unit
         V = abs(rounded - exact) + relative * abs(rounded)
         A = exact[:n, :n]
-        sums, is_whole = absolute_sum(A, np.vstack([np.eye(n), exact[n, :n]]), np.hstack([np.eye(n), exact[:n, n:]]))
-        lost = math.inf  # share of a sum that the roundings of its powers in double can change
+        sums, is_whole = absolute_sum(
+            A, np.vstack([np.eye(n), exact[n, :n]]), np.hstack([np.eye(n), exact[:n, n:]])
+        )
+        # share of a sum that the roundings of its powers in double can change
+        lost = math.inf
         if np.isfinite(sums[:n, :n]).all():
             lost = n * unit * max(abs(np.linalg.eigvals(abs(A) @ sums[:n, :n])), default=0.0)
         if lost > 1e-3:
@@ -293,14 +323,17 @@ class Word:
         S, X = np.hsplit(sums * (1 + lost), [n])
         largest = X @ self.sizes
         output = float(largest[n] + abs(exact[n, n:]) @ self.sizes + self.feedforward)
-        output *= 1 + (n + self.sizes.size + 3) * unit  # the sum itself is rounded
+        # the sum itself is rounded
+        output *= 1 + (n + self.sizes.size + 3) * unit
         rest = V[:, n:] @ self.sizes + abs(rounded[:, n:]) @ self.slips + absolute
         states = least_solution(S[:n] @ V[:n, :n], largest[:n] + S[:n] @ rest[:n])
         states = np.minimum(states, 1.0 if self.precision == FIXED else np.inf)
         if not np.isfinite(states).all():
             return WordLengthBounds(states, is_whole, math.inf, output)
         w = V[:, :n] @ states + rest
-        return WordLengthBounds(states, is_whole, float(S[n] @ w[:n] + w[n] + relative * self.feedforward), output)
+        return WordLengthBounds(
+            states, is_whole, float(S[n] @ w[:n] + w[n] + relative * self.feedforward), output
+        )
 
     def limit_cycle(self, loop: Sampled) -> float | None:
         """Bound on u in a limit cycle that roundings sustain in a loop at rest; None where none was found.
@@ -312,16 +345,21 @@ class Word:
         n = self.law.order
         signals = self.law.signals
         read = loop.in_z.signals
-        if not set(signals) <= set(read):  # an estimated rate
+        # an estimated rate
+        if not set(signals) <= set(read):
             return None
         of = close_around_law(self.rounded, loop)
         at = [read.index(name) for name in signals]
         left = np.vstack([np.eye(len(of.matrix))[of.states], of.reads[at], of.output])
-        S, is_whole = absolute_sum(observable_part(of.matrix, left), left, np.c_[of.of_rounding, of.of_signals[:, at]])
+        S, is_whole = absolute_sum(
+            observable_part(of.matrix, left), left, np.c_[of.of_rounding, of.of_signals[:, at]]
+        )
         if not is_whole:
             return None
-        Q = abs(system_matrix(self.rounded))[:, : n + len(at)]  # references are at rest
-        S[-1, n:] += np.r_[1.0, Q[n, n:]]  # u itself
+        # references are at rest
+        Q = abs(system_matrix(self.rounded))[:, : n + len(at)]
+        # u itself
+        S[-1, n:] += np.r_[1.0, Q[n, n:]]
         relative, absolute = self.errors
         loops = relative * S[:, : n + 1] @ Q
         rest = S @ np.r_[absolute, HALF_STEP * self.ranges[: len(at)] * (self.precision == FIXED)]
@@ -346,7 +384,11 @@ def observable_part(M: Real, left: Real) -> Real:
 
 
 def word_of(
-    law: Law, precision: str, ranges: Mapping[str, float], step: float = 0.0, hub: tuple[float, float] | None = None
+    law: Law,
+    precision: str,
+    ranges: Mapping[str, float],
+    step: float = 0.0,
+    hub: tuple[float, float] | None = None,
 ) -> Word:
     """A realised law in the numbers of a target, with the largest absolute values of its inputs and of u in SI units.
 
@@ -366,7 +408,8 @@ def word_of(
         pole, period = hub
         # the l1 norm of (1 - p)/T (z - 1)/(z - p); of differences within RATE T the estimate is within RATE
         E[at] = min(2 * (1 - pole) / period * ranges.get(ANGLE, 1.0), ranges.get(RATE, math.inf))
-        of_double = (6 + 2 / (1 - pole)) * FLOATS["double"][1] / (1 - pole)  # of its operations, and of the pole
+        # of its operations, and of the pole
+        of_double = (6 + 2 / (1 - pole)) * FLOATS["double"][1] / (1 - pole)
         slips[at] = E[at] * (FLOATS[precision][1] + of_double)
     E += R * np.array([name in law.references for name in (*law.signals, *law.wanted)])
     word = Word(law, precision, E, R, U, ranges.get(FEEDFORWARD, U), step, slips, system_matrix(law))
@@ -397,6 +440,8 @@ def _fixed(word: Word) -> Word:
 
     Raises ParameterError for a feedforward beyond the output, a state without a scale, and coefficients without digits.
     """
+    # of the range of a state
+    least_scale = 2.0**-100
     E = word.sizes
     R = word.ranges
     U = word.output
@@ -413,10 +458,11 @@ def _fixed(word: Word) -> Word:
     # a state without a bound saturates beyond four ranges of u
     with np.errstate(divide="ignore"):
         of_output = 4 * U / abs(S[n, :n])
-    if not is_whole:  # a state whose sum still grows has the scale of u
+    # a state whose sum still grows has the scale of u
+    if not is_whole:
         earlier, _ = absolute_sum(A, np.eye(n), B, MOST_SUMMED // 2)
         of_output[np.isfinite(reach) & (reach <= (1 + SUMMED) * (earlier @ E))] = np.inf
-    size = np.maximum(reach if is_whole else np.minimum(reach, of_output), LEAST_SCALE)
+    size = np.maximum(reach if is_whole else np.minimum(reach, of_output), least_scale)
     if not np.isfinite(size).all():
         poles, vectors = np.linalg.eig(A)
         remedy = (
@@ -429,10 +475,11 @@ def _fixed(word: Word) -> Word:
     scale = np.exp2(np.ceil(np.log2((1 + 2.0**-10) * size)))
     scaled = S * np.r_[scale, np.ones(R.size)] / np.r_[scale, 1.0][:, None]
     table = scaled * np.r_[one, R] / np.r_[one, U][:, None]
-    sums = abs(table) @ np.r_[one, E / R] + np.r_[np.zeros(n), 1.0]  # of u with the feedforward
+    # of u with the feedforward
+    sums = abs(table) @ np.r_[one, E / R] + np.r_[np.zeros(n), 1.0]
     most = 2.0**FRACTION_BITS - len(table) - R.size
     # at most those of a sum of products
-    shifts = np.minimum(np.floor(np.log2(most / np.maximum(sums, LEAST_SCALE))).astype(int), 62)
+    shifts = np.minimum(np.floor(np.log2(most / np.maximum(sums, least_scale))).astype(int), 62)
     is_largest = abs(table) == abs(table).max(axis=1)[:, None]
     _check(table, is_largest & (shifts < 1)[:, None], "q31 at these ranges")
     whole = np.rint(np.ldexp(table, shifts[:, None])).astype(np.int64)

@@ -37,8 +37,10 @@ from tfarm.records import frozen
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Column, Quantity, Table
 
-CONFIDENCE = 0.95  # of every interval of a fit: the usual one
-LEAST_SHARE = 1e-5  # of |H|: no measured response is better known than that, whatever its coherence
+# of every interval of a fit: the usual one
+CONFIDENCE = 0.95
+# of |H|: no measured response is better known than that, whatever its coherence
+LEAST_SHARE = 1e-5
 
 
 def require_all(key: str, values: Real, is_good: NDArray[np.bool_], remedy: str) -> None:
@@ -83,7 +85,9 @@ class Measured:
         ordered = "repeated or not in ascending order; sort the rows, and average those of one frequency"
         require_all("frequency", w, (w > 0) & np.isfinite(w), "positive and finite; leave other rows out")
         require_all("frequency", w[1:], np.diff(w) > 0, ordered)
-        require_all("frequency", w, np.isfinite(self.values), "has a value that is no number; leave the row out")
+        require_all(
+            "frequency", w, np.isfinite(self.values), "has a value that is no number; leave the row out"
+        )
         require(self.values.any(), f"{self.name} values", 0.0, nothing)
         if (sigma := self.sigma) is not None:
             require_all("sigma", sigma, (sigma > 0) & np.isfinite(sigma), "a standard deviation is positive")
@@ -107,7 +111,9 @@ class Measured:
         return unit_over(signal_words(self.output)[1], signal_words(self.input)[1])
 
     @property
-    def points(self) -> Annotated[int, Quantity("measured frequencies", key="points", help="number of frequencies")]:
+    def points(
+        self,
+    ) -> Annotated[int, Quantity("measured frequencies", key="points", help="number of frequencies")]:
         """The number of frequencies."""
         return int(self.omega.size)
 
@@ -120,7 +126,8 @@ class Measured:
     def range_hz(
         self,
     ) -> Annotated[
-        tuple[float, float], Quantity("frequency range", "Hz", key="range_hz", help="first and last measured frequency")
+        tuple[float, float],
+        Quantity("frequency range", "Hz", key="range_hz", help="first and last measured frequency"),
     ]:
         """The same [Hz]."""
         return self.band[0] / HERTZ, self.band[1] / HERTZ
@@ -128,7 +135,12 @@ class Measured:
     @property
     def csv_table(self) -> Table:
         """A row a frequency, in the columns that `read_measured` reads."""
-        columns = {"re": self.values.real, "im": self.values.imag, "sigma": self.sigma, "coherence": self.coherence}
+        columns = {
+            "re": self.values.real,
+            "im": self.values.imag,
+            "sigma": self.sigma,
+            "coherence": self.coherence,
+        }
         titles = {"re": f"Re {self.name}", "im": f"Im {self.name}"}
         rows = [Column("hz", "frequency", "Hz", of=self.omega / HERTZ, digits=singly(general, 9))]
         rows += [
@@ -136,7 +148,9 @@ class Measured:
             for key, x in columns.items()
             if x is not None
         ]
-        rows += [Column("averages", "averages", of=[self.averages] * self.points)] * (self.averages is not None)
+        rows += [Column("averages", "averages", of=[self.averages] * self.points)] * (
+            self.averages is not None
+        )
         return Table(columns=tuple(rows))
 
 
@@ -220,10 +234,13 @@ def _scatter(values: NDArray[Any]) -> Real:
     return np.maximum(size, least) * max(typical, LEAST_SHARE)
 
 
-MOST_RECORD_BYTES = 256 * 1024 * 1024  # of a record; an hour of two signals at 1 kHz as text has 150 MB
-FREQUENCIES = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}  # its unit, and rad/s in one
+# of a record; an hour of two signals at 1 kHz as text has 150 MB
+MOST_RECORD_BYTES = 256 * 1024 * 1024
+# its unit, and rad/s in one
+FREQUENCIES = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}
 VALUES = ("re", "im", "abs", "db", "deg")
-NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"  # as it is written in a cell or an option
+# as it is written in a cell or an option
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 
 
 @frozen(slots=True)
@@ -252,7 +269,9 @@ def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
         numbered = enumerate(
             decode_text(data, "is not UTF-8 text; save the file as CSV in UTF-8").splitlines(), start=1
         )
-        rows = [(number, line) for number, line in numbered if line.strip() and not line.lstrip().startswith("#")]
+        rows = [
+            (number, line) for number, line in numbered if line.strip() and not line.lstrip().startswith("#")
+        ]
         require(rows, "header", MISSING, "the file is empty; begin with the names of columns")
         separator = next((each for each in "\t;" if each in rows[0][1]), ",")
         units = _header(list(map(_cell, rows[0][1].split(separator))))
@@ -273,7 +292,9 @@ def _header(cells: Sequence[str]) -> dict[str, str]:
             MISSING,
             "the first line holds numbers; begin the file with the names of its columns",
         )
-        require(name and name not in units, f"header, column {place}", name, "each column has a name of its own")
+        require(
+            name and name not in units, f"header, column {place}", name, "each column has a name of its own"
+        )
         units[name] = unit.strip()
     return units
 
@@ -312,7 +333,12 @@ def data_of(text: str, key: str = "--data") -> Measured:
     """
     names, _, path = text.partition("=")
     output, slash, input = (part.strip() for part in names.partition("/"))
-    require(slash and path.strip(), key, text, "write OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv")
+    require(
+        slash and path.strip(),
+        key,
+        text,
+        "write OUTPUT/INPUT=FILE, such as tip_acceleration/hub_angle=sweep.csv",
+    )
     return read_measured(path.strip(), output, input)
 
 
@@ -374,7 +400,9 @@ def _frequencies(sheet: Sheet) -> Real:
     sheet.refuse(name, ~(frequency > 0), "a frequency is positive; leave the row out")
     back = np.r_[False, np.diff(frequency) <= 0]
     again = frequency[back.argmax()] in frequency[: back.argmax()]
-    sheet.refuse(name, back, "is there twice; average its rows" if again else "is below the one before; sort the rows")
+    sheet.refuse(
+        name, back, "is there twice; average its rows" if again else "is below the one before; sort the rows"
+    )
     return frequency * scale
 
 
@@ -403,7 +431,8 @@ def _of_uff(path: str, number: str, output: str, input: str) -> Measured:
     require(find_spec("pyuff"), "package", "pyuff", remedy)
     found = read_arrays("uff", path, key=key, remedy="no UFF file that can be read")
     with name_file(path):
-        count = len(found) // 2  # frequencies and values of each
+        # frequencies and values of each
+        count = len(found) // 2
         require(count, "data set", 58, "the file holds no frequency response function (type 58, function 4)")
         remedy = f"the file holds {count} responses; choose one by its number, as file.uff#2"
         require(number or count == 1, "data set", MISSING, remedy)
@@ -411,7 +440,8 @@ def _of_uff(path: str, number: str, output: str, input: str) -> Measured:
         require(1 <= place <= count, "data set", place, f"from 1 to {count}, the responses of the file")
         omega = 2 * np.pi * np.asarray(found[f"x{place - 1}"], dtype=float)
         values: NDArray[Any] = np.asarray(found[f"data{place - 1}"], dtype=complex)
-        kept = slice(int(omega.size > 0 and omega[0] == 0), None)  # the line at 0 Hz that spectra begin with
+        # the line at 0 Hz that spectra begin with
+        kept = slice(int(omega.size > 0 and omega[0] == 0), None)
         return Measured(
             output=output,
             input=input,

@@ -27,19 +27,19 @@ from scipy.special import chdtrc, stdtrit
 
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, require
+from tfarm.fitting.data import CONFIDENCE
+from tfarm.fitting.resonances import least_projected, project
 from tfarm.records import frozen
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Quantity
 
-from .data import CONFIDENCE
-from .resonances import least_projected, project
-
 if TYPE_CHECKING:
-    from .recording import Recording
+    from tfarm.fitting.recording import Recording
 
-NOT_WHITE = 1e-3  # probability below which residuals are called correlated
-MOST_ROWS = 160  # of the Hankel matrix of the start; slower oscillations are looked for in means of several samples
-EACH = 4  # parameters of a mode: sigma, w, a, b; the constant c is the last
+# probability below which residuals are called correlated
+NOT_WHITE = 1e-3
+# parameters of a mode: sigma, w, a, b; the constant c is the last
+EACH = 4
 
 
 class DecayMode(NamedTuple):
@@ -50,25 +50,32 @@ class DecayMode(NamedTuple):
     frequency_low: Annotated[float, Quantity("from", "Hz", 7, "lower end of its 95 % interval")]
     frequency_high: Annotated[float, Quantity("to", "Hz", 7, "upper end of its 95 % interval")]
     frequency_std: Annotated[float, Quantity(unit="Hz", help="standard deviation of the frequency")]
-    natural_frequency: Annotated[float, Quantity(unit="Hz", help="abs(s), above the frequency by the damping")]
+    natural_frequency: Annotated[
+        float, Quantity(unit="Hz", help="abs(s), above the frequency by the damping")
+    ]
     damping_ratio: Annotated[float, Quantity("damping ratio", digits=4, help="-Re s/abs(s)")]
     damping_ratio_low: Annotated[float, Quantity("from", digits=4, help="lower end of its 95 % interval")]
     damping_ratio_high: Annotated[float, Quantity("to", digits=4, help="upper end of its 95 % interval")]
     damping_ratio_std: Annotated[float, Quantity(help="standard deviation of the damping ratio")]
     amplitude: Annotated[
-        float, Quantity("amplitude at the start", digits=4, help="in the unit of the signal, at the first sample")
+        float,
+        Quantity("amplitude at the start", digits=4, help="in the unit of the signal, at the first sample"),
     ]
     option: Annotated[
         str,
         Quantity(
-            "for tfarm fit --mode N=", key="mode_option", help="value that passes the mode on to a fit of the arm"
+            "for tfarm fit --mode N=",
+            key="mode_option",
+            help="value that passes the mode on to a fit of the arm",
         ),
     ]
     first_half: Annotated[
-        float | None, Quantity(key="frequency_first_half_hz", help="frequency by the first half of the record alone")
+        float | None,
+        Quantity(key="frequency_first_half_hz", help="frequency by the first half of the record alone"),
     ]
     second_half: Annotated[
-        float | None, Quantity(key="frequency_second_half_hz", help="frequency by the second half of the record alone")
+        float | None,
+        Quantity(key="frequency_second_half_hz", help="frequency by the second half of the record alone"),
     ]
 
 
@@ -104,7 +111,9 @@ class RingdownFit:
         ),
     ]
     notes: Annotated[tuple[str, ...], Quantity("notes", help="limits of the intervals")]
-    modes: Annotated[tuple[DecayMode, ...], Quantity("modes", help="damped oscillations, that of most energy first")]
+    modes: Annotated[
+        tuple[DecayMode, ...], Quantity("modes", help="damped oscillations, that of most energy first")
+    ]
     level: Annotated[
         float, Quantity("probability of the intervals", help="share of intervals that hold the true value")
     ] = CONFIDENCE
@@ -113,7 +122,10 @@ class RingdownFit:
     def is_white(
         self,
     ) -> Annotated[
-        bool, Quantity("residuals white", key="residuals_white", help="whether the residuals look like white noise")
+        bool,
+        Quantity(
+            "residuals white", key="residuals_white", help="whether the residuals look like white noise"
+        ),
     ]:
         """Whether the residuals look like white noise."""
         return self.white >= NOT_WHITE
@@ -133,9 +145,12 @@ def fit_ringdown(
     found = nearest_sum(t, y, poles) if poles.size == modes else None
     if found is None:
         word = "oscillation" if modes == 1 else f"{modes} oscillations"
-        raise ConvergenceError(f"no {word} found in the decay: choose other times, or fewer modes", None, None)
+        raise ConvergenceError(
+            f"no {word} found in the decay: choose other times, or fewer modes", None, None
+        )
     squares = float(found.e @ found.e)
-    rounding = 1e-9  # of the signal and of w: smaller differences are rounding
+    # of the signal and of w: smaller differences are rounding
+    rounding = 1e-9
     white = 1.0 if squares <= y.size * (rounding * abs(y).max()) ** 2 else whiteness(found.e)
     notes = [recording.note] if recording.note else []
     if white < NOT_WHITE:
@@ -172,7 +187,9 @@ def fit_ringdown(
     )
 
 
-def _samples(recording: Recording, name: str, start: float | None, stop: float | None, modes: int) -> tuple[Real, Real]:
+def _samples(
+    recording: Recording, name: str, start: float | None, stop: float | None, modes: int
+) -> tuple[Real, Real]:
     """Return times [s] and samples of a signal between two times, enough for that many modes."""
     y = recording.signal(name, "--signal")
     times = recording.times
@@ -300,13 +317,15 @@ def starting_poles(t: Real, y: Real, modes: int) -> Complex:
     Of a rate they are ln of the eigenvalues by which the signal subspace of the Hankel matrix moves in one sample.
     There are fewer where not enough poles turn half a turn in the record, and neither die in a sample nor explode.
     """
+    # of the Hankel matrix of the start; slower oscillations are looked for in means of several samples
+    most_rows = 160
     period = t[1] - t[0]
     duration = t[-1] - t[0]
     thin = 1
     found = []
-    while thin == 1 or t.size // thin >= MOST_ROWS:
+    while thin == 1 or t.size // thin >= most_rows:
         means = (y - y.mean())[: t.size // thin * thin].reshape(-1, thin).mean(axis=1)
-        rows = min(means.size // 2, MOST_ROWS)
+        rows = min(means.size // 2, most_rows)
         hankel = np.lib.stride_tricks.sliding_window_view(means, rows)
         # four further poles take up drift and noise
         V = np.linalg.eigh(hankel.T @ hankel)[1][:, -min(2 * modes + 4, rows - 1) :]

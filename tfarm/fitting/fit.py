@@ -26,18 +26,12 @@ from tfarm.arrays import Complex, Real
 from tfarm.digits import join_words
 from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.files import is_standard_output, write_file
-from tfarm.loop.plane import gain_map
-from tfarm.records import frozen
-from tfarm.response import transfer
-from tfarm.schema import Quantity
-from tfarm.stopping import Progress
-
-from .data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of, rms
-from .misses import Miss, Remedy, misses_of, remedies_of
-from .model import SENSOR_DELAY, SENSOR_GAIN, FitResponse, Problem, RingMode, free_parameters
-from .overlay import ResonanceShift, ratio_of, resonance_shifts
-from .posterior import SUFFIX, Posterior, Repeats, posterior_of, repeats
-from .solve import (
+from tfarm.fitting.data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of, rms
+from tfarm.fitting.misses import Miss, Remedy, misses_of, remedies_of
+from tfarm.fitting.model import SENSOR_DELAY, SENSOR_GAIN, FitResponse, Problem, RingMode, free_parameters
+from tfarm.fitting.overlay import ResonanceShift, ratio_of, resonance_shifts
+from tfarm.fitting.posterior import SUFFIX, Posterior, Repeats, posterior_of, repeats
+from tfarm.fitting.solve import (
     FIT_SEED,
     BetterError,
     Fitted,
@@ -48,8 +42,11 @@ from .solve import (
     nearest_minimum,
     sum_of_squares,
 )
-
-LONGEST_NAME = 200  # characters of a file in an assumption
+from tfarm.loop.plane import gain_map
+from tfarm.records import frozen
+from tfarm.response import transfer
+from tfarm.schema import Quantity
+from tfarm.stopping import Progress
 
 
 class FittedResponse(NamedTuple):
@@ -65,7 +62,10 @@ class FittedResponse(NamedTuple):
     high: Annotated[float, Quantity("to", "Hz", key="to_hz", help="last measured frequency")]
     noise: Annotated[str, Quantity("noise by", help="origin of the standard deviation of its values")]
     chi_squared: Annotated[
-        float, Quantity("chi-squared", digits=4, help="its share of the sum of squared residuals over their deviations")
+        float,
+        Quantity(
+            "chi-squared", digits=4, help="its share of the sum of squared residuals over their deviations"
+        ),
     ]
 
 
@@ -83,7 +83,8 @@ class Fit(Solution):
         tuple[Fitted, ...], Quantity("fitted numbers", help="free numbers with their confidence intervals")
     ]
     not_determined: Annotated[
-        tuple[str, ...], Quantity("not identifiable", help="numbers, or combinations of them, that the data leave open")
+        tuple[str, ...],
+        Quantity("not identifiable", help="numbers, or combinations of them, that the data leave open"),
     ]
     interval_by: Annotated[
         str, Quantity("intervals by", help="profile likelihood, or covariance of the linearised residuals")
@@ -96,7 +97,9 @@ class Fit(Solution):
         return self.before.name
 
     @property
-    def arm_table(self) -> Annotated[dict[str, Any], Quantity(key="arm", help="fitted arm as its TOML file has it")]:
+    def arm_table(
+        self,
+    ) -> Annotated[dict[str, Any], Quantity(key="arm", help="fitted arm as its TOML file has it")]:
         """The fitted arm as its file has it."""
         return tomllib.loads(to_toml(self.arm))
 
@@ -168,7 +171,8 @@ class Fit(Solution):
     def records(
         self,
     ) -> Annotated[
-        Repeats | None, Quantity("scatter between records", help="numbers fitted to each record of one response alone")
+        Repeats | None,
+        Quantity("scatter between records", help="numbers fitted to each record of one response alone"),
     ]:
         """The scatter between the records of one response."""
         return repeats(self, self.parameters)
@@ -202,7 +206,9 @@ class Fit(Solution):
     @cached_property
     def misses(
         self,
-    ) -> Annotated[tuple[Miss, ...], Quantity("misses", help="responses that the fitted curve misses by a factor")]:
+    ) -> Annotated[
+        tuple[Miss, ...], Quantity("misses", help="responses that the fitted curve misses by a factor")
+    ]:
         """The responses that the curve misses."""
         return misses_of(self)
 
@@ -211,7 +217,9 @@ class Fit(Solution):
         self,
     ) -> Annotated[
         tuple[Remedy, ...],
-        Quantity("remedies", help="single changes that were tried on a curve that misses, the most helpful first"),
+        Quantity(
+            "remedies", help="single changes that were tried on a curve that misses, the most helpful first"
+        ),
     ]:
         """The changes tried on a curve that misses; none of one that does not."""
         return remedies_of(self) if self.misses else ()
@@ -256,7 +264,8 @@ class Fit(Solution):
     def advice(
         self,
     ) -> Annotated[
-        str | None, Quantity("remedy", key="remedy", help="change of the search that helps most where the curve misses")
+        str | None,
+        Quantity("remedy", key="remedy", help="change of the search that helps most where the curve misses"),
     ]:
         """The remedy that helps most, or that none of those tried is enough; None where the curve does not miss."""
         if not self.misses:
@@ -296,7 +305,8 @@ def fit(
         except BetterError as better:
             (there,) = better.args
             found = replace(nearest_minimum(there.problem, there.point), starts=found.starts)
-    else:  # one valley after another: no end of it
+    else:
+        # one valley after another: no end of it
         found = replace(found, converged=False)
         fitted, unknown = confidence_intervals(found, profile=False)
     fit = Fit(
@@ -312,6 +322,8 @@ def fit(
 
 def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
     """The arm's assumptions, those that name a fitted number marked as of the start, then the fit and its data."""
+    # characters of a file in an assumption
+    longest_name = 200
     family = fit.problem.family
     texts: list[str] = []
     for text in before:
@@ -324,7 +336,9 @@ def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
     texts.append(f"Fitted: {join_words(values)}, from the arm {fit.before.name}; {fit.in_words}.")
     for each in fit.responses:
         digest = each.digest or "none"
-        texts.append(f"Fitted to {each.label} of {one_line(Path(each.source).name, LONGEST_NAME)}, SHA-256 {digest}.")
+        texts.append(
+            f"Fitted to {each.label} of {one_line(Path(each.source).name, longest_name)}, SHA-256 {digest}."
+        )
     return (*texts, *(f"Of the fit: {words}." for words in fit.not_determined))
 
 
@@ -360,7 +374,8 @@ def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: An
     return subject
 
 
-ARMS = 40  # that a report draws
+# that a report draws
+ARMS = 40
 
 
 def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
@@ -377,10 +392,14 @@ def arms_drawn(fit: Fit, count: int) -> tuple[Arm, ...]:
     # ten draws for each arm wanted, at most
     normal = np.random.default_rng(FIT_SEED).standard_normal((10 * count, len(own)))
     # of draws of a normal distribution: one whose sum of squares is larger is none of them
-    most = fit.chi_squared + 2.0 * gammaincinv(len(own) / 2, 0.999)  # the quantile of chi squared
+    # the quantile of chi squared
+    most = fit.chi_squared + 2.0 * gammaincinv(len(own) / 2, 0.999)
     kept: list[Arm] = []
     for values in fit.posterior.with_all_determined.draws({}, normal).tolist():
-        x = np.array([each.coordinate(value) for each, value in zip(own, values, strict=True)]) - fit.point[: len(own)]
+        x = (
+            np.array([each.coordinate(value) for each, value in zip(own, values, strict=True)])
+            - fit.point[: len(own)]
+        )
         point = fit.problem.inside(fit.point + np.r_[x, of_sensors @ x])
         if sum_of_squares(fit.problem, point) <= most:
             kept.append(fit.problem.arm(point))

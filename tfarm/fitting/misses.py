@@ -15,20 +15,25 @@ import numpy as np
 
 from tfarm.arrays import Complex
 from tfarm.digits import join_words
+from tfarm.fitting.data import rms
+from tfarm.fitting.model import SENSOR_DELAY, SENSOR_GAIN, FitResponse, Problem, free_parameters
+from tfarm.fitting.solve import EXCLUDED, Solution, best_solution, is_explained
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Quantity
-
-from .data import rms
-from .model import SENSOR_DELAY, SENSOR_GAIN, FitResponse, Problem, free_parameters
-from .solve import EXCLUDED, Solution, best_solution, is_explained
 
 
 class Miss(NamedTuple):
     """A response that the curve misses: by what factor and angle (root mean squares), and in which range."""
 
-    response: Annotated[str, Quantity("response missed", help="output/input of a response that the curve misses")]
-    factor: Annotated[float, Quantity("factor", digits=3, help="exp of the rms of ln abs(computed/measured) there")]
-    degrees: Annotated[float, Quantity("angle", "deg", 3, "rms of the phase of computed/measured there", "degrees")]
+    response: Annotated[
+        str, Quantity("response missed", help="output/input of a response that the curve misses")
+    ]
+    factor: Annotated[
+        float, Quantity("factor", digits=3, help="exp of the rms of ln abs(computed/measured) there")
+    ]
+    degrees: Annotated[
+        float, Quantity("angle", "deg", 3, "rms of the phase of computed/measured there", "degrees")
+    ]
     low: Annotated[float, Quantity("from", "Hz", 4, "first frequency at which the curve misses", "from_hz")]
     high: Annotated[float, Quantity("to", "Hz", 4, "last frequency at which the curve misses", "to_hz")]
 
@@ -43,10 +48,15 @@ class Remedy(NamedTuple):
     """A single change of the search that was tried on a curve that misses."""
 
     change: Annotated[str, Quantity("remedy tried", help="change of the search that was tried alone")]
-    log_likelihood: Annotated[float, Quantity("gain of ln likelihood", digits=4, help="by that change of the search")]
-    is_enough: Annotated[bool, Quantity("removes the miss", key="removes", help="whether no response is missed then")]
+    log_likelihood: Annotated[
+        float, Quantity("gain of ln likelihood", digits=4, help="by that change of the search")
+    ]
+    is_enough: Annotated[
+        bool, Quantity("removes the miss", key="removes", help="whether no response is missed then")
+    ]
     is_explained: Annotated[
-        bool | None, Quantity("noise explains the rest", key="explained", help="none where its size is not known")
+        bool | None,
+        Quantity("noise explains the rest", key="explained", help="none where its size is not known"),
     ]
 
     @property
@@ -122,8 +132,14 @@ def _tries(found: Solution) -> Iterator[tuple[str, Solution]]:
         if min(values) < 0 and key == SENSOR_GAIN:
             pairs = list(zip(problem.responses, values, strict=True))
             names = [each.data.name for each, value in pairs if value < 0]
-            turned = (replace(each, data=replace(each.data, values=np.sign(x) * each.data.values)) for each, x in pairs)
-            yield f"the other sign of {join_words(names)}", _searched(replace(problem, responses=tuple(turned)))
+            turned = (
+                replace(each, data=replace(each.data, values=np.sign(x) * each.data.values))
+                for each, x in pairs
+            )
+            yield (
+                f"the other sign of {join_words(names)}",
+                _searched(replace(problem, responses=tuple(turned))),
+            )
     yield from _beyond_bounds(found)
 
 
@@ -133,7 +149,9 @@ def _beyond_bounds(found: Solution) -> Iterator[tuple[str, Solution]]:
     low, high = problem.bounds
     # of a coordinate: a search that ends so near to a bound has ended there
     is_at_end = np.minimum(found.point - low, high - found.point) < 0.01
-    _, unbound = free_parameters(problem.arm(found.point), problem.family.keys, start={}, bounds={}, priors={})
+    _, unbound = free_parameters(
+        problem.arm(found.point), problem.family.keys, start={}, bounds={}, priors={}
+    )
     numbers = [
         replace(free, prior=each.prior) if at_end or (each.low, each.high) != (free.low, free.high) else each
         for each, free, at_end in zip(problem.of_the_arm, unbound, is_at_end, strict=False)

@@ -29,16 +29,17 @@ from tfarm.errors import ConvergenceError, ParameterError, did_you_mean, require
 from tfarm.exact.characteristic import characteristic
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exact.system import system_of
+from tfarm.fitting.data import NUMBER, Measured, Noise, in_parts
 from tfarm.records import frozen
 from tfarm.response.signals import Signals
 from tfarm.spectrum import modes
 from tfarm.spectrum.box import newton
 from tfarm.spectrum.table import first_frequency
 
-from .data import NUMBER, Measured, Noise, in_parts
-
-FARTHEST_FROM_START = 1e4  # times or a part of it: beyond, a search has lost its way, or the data say nothing
-COORDINATE_STEP = 2.0**-20  # of a derivative by differences: the rounding of a float over it is 1e-10, its square below
+# times or a part of it: beyond, a search has lost its way, or the data say nothing
+FARTHEST_FROM_START = 1e4
+# of a derivative by differences: the rounding of a float over it is 1e-10, its square below
+COORDINATE_STEP = 2.0**-20
 
 
 @frozen
@@ -72,7 +73,9 @@ class Parameter:
         """Of the coordinate."""
         if self.size:
             return self.coordinate(self.low), self.coordinate(self.high)
-        shares = np.clip([self.low / self.start, self.high / self.start], 1 / FARTHEST_FROM_START, FARTHEST_FROM_START)
+        shares = np.clip(
+            [self.low / self.start, self.high / self.start], 1 / FARTHEST_FROM_START, FARTHEST_FROM_START
+        )
         return math.log(shares.min()), math.log(shares.max())
 
     def ends(self, coordinates: Sequence[float]) -> list[float | None]:
@@ -189,7 +192,9 @@ def eigenvalue(arm: Arm, number: int) -> complex:
     start = 1j * modes(arm, number).natural_frequency[-1:]
     found = newton(lambda s: characteristic(system, s), start)
     if not (found.imag > 0).any():
-        raise ConvergenceError(f"mode {number} of {arm.name} does not ring near its undamped frequency", found, None)
+        raise ConvergenceError(
+            f"mode {number} of {arm.name} does not ring near its undamped frequency", found, None
+        )
     return complex(found[0])
 
 
@@ -204,7 +209,8 @@ class FitResponse:
 
     data: Measured
     noise: Noise
-    gain: int | None = None  # place in the vector of what is searched for
+    # place in the vector of what is searched for
+    gain: int | None = None
     delay: int | None = None
 
     @property
@@ -293,7 +299,10 @@ class Problem:
             names = tuple(sorted(signals))
             under_drive = arm if arm.input == drives else replace(arm, input=cast("Input", drives))
             drive, numerators, scale = Signals(under_drive, names).parts((1j + share) * np.frombuffer(grid))
-            known[grid, drives] = {drives: drive} | dict(zip(names, numerators, strict=True)), np.asarray(scale.real)
+            known[grid, drives] = (
+                {drives: drive} | dict(zip(names, numerators, strict=True)),
+                np.asarray(scale.real),
+            )
         found = []
         for each, key in zip(self.responses, keys, strict=True):
             gain = 1.0 if each.gain is None else self.value(point, each.gain)
@@ -328,12 +337,16 @@ class Problem:
         """(size,): real and imaginary parts of computed less measured over their deviations, then decays and priors."""
         fractions, others = self._terms(point)
         pairs = zip(fractions, self.responses, strict=True)
-        return np.concatenate([*(one.over_deviation(N / D - one.data.values) for (N, D, _), one in pairs), others])
+        return np.concatenate(
+            [*(one.over_deviation(N / D - one.data.values) for (N, D, _), one in pairs), others]
+        )
 
     def jacobian(self, point: Real) -> Real:
         """(size, parameters): the derivatives of the residuals."""
         here = self._terms(point)
-        return np.stack([self._slope(here, point, step) for step in COORDINATE_STEP * np.eye(point.size)], axis=1)
+        return np.stack(
+            [self._slope(here, point, step) for step in COORDINATE_STEP * np.eye(point.size)], axis=1
+        )
 
     def _slope(self, here: tuple[list[Fraction], Real], point: Real, step: Real) -> Real:
         """The derivatives along one coordinate; from the arm itself where there is none on one side."""
@@ -356,7 +369,11 @@ class Problem:
     def _terms(self, point: Real) -> tuple[list[Fraction], Real]:
         """The responses, and what decays and priors leave."""
         coordinates = zip(self.parameters, point.tolist(), strict=True)
-        priors = [(each.value(x) - each.prior[0]) / each.prior[1] for each, x in coordinates if each.prior is not None]
+        priors = [
+            (each.value(x) - each.prior[0]) / each.prior[1]
+            for each, x in coordinates
+            if each.prior is not None
+        ]
         return self.fractions(point), np.r_[self.decays(point, self.rings), priors]
 
     def decays(self, point: Real, rings: Sequence[RingMode]) -> Real:

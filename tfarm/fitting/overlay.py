@@ -23,18 +23,9 @@ from tfarm.arm import INPUTS, Arm, Input, must_be_arm
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.exact.outputs import unit_over
-from tfarm.records import frozen
-from tfarm.response import TransferFunction, transfer
-from tfarm.response.frequency import HERTZ, refined_grid, without_cancelled
-from tfarm.response.signals import Signals, locate_output
-from tfarm.response.transfer import Roots
-from tfarm.schema import Column, Quantity, Table
-from tfarm.spectrum import modes as modes_of
-from tfarm.spectrum import modes_below
-
-from .data import Measured, Noise, check_signal, must_be_measured, noise_of, rms
-from .model import FitResponse
-from .resonances import (
+from tfarm.fitting.data import Measured, Noise, check_signal, must_be_measured, noise_of, rms
+from tfarm.fitting.model import FitResponse
+from tfarm.fitting.resonances import (
     PARTNERS_BEYOND,
     Resonance,
     matched_peaks,
@@ -43,6 +34,14 @@ from .resonances import (
     peaks_of,
     resonance_at,
 )
+from tfarm.records import frozen
+from tfarm.response import TransferFunction, transfer
+from tfarm.response.frequency import HERTZ, refined_grid, without_cancelled
+from tfarm.response.signals import Signals, locate_output
+from tfarm.response.transfer import Roots
+from tfarm.schema import Column, Quantity, Table
+from tfarm.spectrum import modes as modes_of
+from tfarm.spectrum import modes_below
 
 
 @frozen(slots=True, kw_only=True)
@@ -128,7 +127,9 @@ class Ratio:
         """Poles and zeros with |Im s| <= up_to [rad/s], as each transfer function has them, complete."""
         own_poles, own_zeros = map(_upper, (self.poles(up_to).values, self.above.zeros(up_to=up_to).values))
         poles, zeros = without_cancelled(own_poles, own_zeros)
-        below = self.above.system.at_rest if self.below is None else Signals(self.arm, (self.input,)).orders[0]
+        below = (
+            self.above.system.at_rest if self.below is None else Signals(self.arm, (self.input,)).orders[0]
+        )
         return RatioRoots(
             poles=poles,
             zeros=zeros,
@@ -176,20 +177,35 @@ class Counterpart:
     level: complex | None = None
     mode: Annotated[
         int | None,
-        Quantity("mode", help="number of the arm's mode; none where the poles of the response are no modes of the arm"),
+        Quantity(
+            "mode",
+            help="number of the arm's mode; none where the poles of the response are no modes of the arm",
+        ),
     ]
-    exact: Annotated[float, Quantity("exact", "Hz", 7, "natural frequency abs(s) of the exact response's pole")]
+    exact: Annotated[
+        float, Quantity("exact", "Hz", 7, "natural frequency abs(s) of the exact response's pole")
+    ]
     frequency: Annotated[
         float | None,
-        Quantity("measured", "Hz", 7, "abs(s) of the pole fitted to the peak, or the peak itself", "measured_hz"),
+        Quantity(
+            "measured", "Hz", 7, "abs(s) of the pole fitted to the peak, or the peak itself", "measured_hz"
+        ),
     ] = None
     frequency_std: Annotated[
         float | None,
-        Quantity("deviation", "Hz", 2, key="measured_std_hz", help="standard deviation of the fitted pole's frequency"),
+        Quantity(
+            "deviation",
+            "Hz",
+            2,
+            key="measured_std_hz",
+            help="standard deviation of the fitted pole's frequency",
+        ),
     ] = None
     off: Annotated[
         float | None,
-        Quantity("difference", "%", 3, "measured over exact frequency, less one", "frequency_residual_percent"),
+        Quantity(
+            "difference", "%", 3, "measured over exact frequency, less one", "frequency_residual_percent"
+        ),
     ] = None
     measured_damping: Annotated[
         float | None,
@@ -211,16 +227,25 @@ class Counterpart:
     ] = None
     level_db: Annotated[
         float | None,
-        Quantity("residue, measured over exact", "dB", 3, "gain error of the sensor and shift of the mode shape"),
+        Quantity(
+            "residue, measured over exact", "dB", 3, "gain error of the sensor and shift of the mode shape"
+        ),
     ] = None
     level_degrees: Annotated[
         float | None,
         Quantity("turned", "deg", 3, "phase of the residue; 180 deg is a reversed sign", "level_degrees"),
     ] = None
-    is_peak_only: Annotated[bool, Quantity(help="whether the lines around the peak determine no pole")] = False
+    is_peak_only: Annotated[bool, Quantity(help="whether the lines around the peak determine no pole")] = (
+        False
+    )
     damping_ratio: Annotated[
         float,
-        Quantity("exact damping ratio", digits=4, key="exact_damping_ratio", help="of the pole of the exact response"),
+        Quantity(
+            "exact damping ratio",
+            digits=4,
+            key="exact_damping_ratio",
+            help="of the pole of the exact response",
+        ),
     ]
 
 
@@ -231,7 +256,13 @@ class RequiredChange(NamedTuple):
     mode: Annotated[int, Quantity("mode", help="number of the mode whose measured frequency is met")]
     change: Annotated[
         float,
-        Quantity("change", "%", 4, "relative change that moves the mode to its measured frequency", "change_percent"),
+        Quantity(
+            "change",
+            "%",
+            4,
+            "relative change that moves the mode to its measured frequency",
+            "change_percent",
+        ),
     ]
 
 
@@ -252,7 +283,8 @@ class Overlay:
     omega: Real
     curve: Complex
     modes: Annotated[
-        tuple[Counterpart, ...], Quantity("mode by mode", help="exact and measured poles, a row a pole in the range")
+        tuple[Counterpart, ...],
+        Quantity("mode by mode", help="exact and measured poles, a row a pole in the range"),
     ]
     unmatched: Real
 
@@ -299,7 +331,10 @@ class Overlay:
     def rms_log_error(
         self,
     ) -> Annotated[
-        float, Quantity("rms of ln(measured/exact)", digits=4, help="root mean square over frequencies above the noise")
+        float,
+        Quantity(
+            "rms of ln(measured/exact)", digits=4, help="root mean square over frequencies above the noise"
+        ),
     ]:
         """The root mean square of ln |measured/exact|, over frequencies above the noise."""
         values = self.measured.values
@@ -322,7 +357,11 @@ class Overlay:
         It is exp(ln(measured/exact)/S) - 1 with S = d ln w/d ln p: exact for a power law, as of Young's modulus or the
         density, else to first order.  Without factors beyond 3, or of a number that hardly moves the mode.
         """
-        ratios = {row.mode: row.frequency_ratio for row in self.modes if row.mode and row.frequency_ratio is not None}
+        ratios = {
+            row.mode: row.frequency_ratio
+            for row in self.modes
+            if row.mode and row.frequency_ratio is not None
+        }
         if not ratios:
             return ()
         table = modes_of(self.ratio.driven, max(ratios))
@@ -393,7 +432,9 @@ def _counterparts(
         if table is not None:
             away = abs(table.natural_frequency / size - 1)
             mode = int(table.index[away.argmin()]) * (away.min() < same)
-        row = Counterpart(pole=pole, mode=mode or None, exact=size / HERTZ, damping_ratio=-pole.real / size + 0.0)
+        row = Counterpart(
+            pole=pole, mode=mode or None, exact=size / HERTZ, damping_ratio=-pole.real / size + 0.0
+        )
         found.append(row if place is None else _seen(row, ratio.residue(pole, roots), measured, noise, place))
     return tuple(found)
 
@@ -404,7 +445,12 @@ def _seen(row: Counterpart, residue: complex, measured: Measured, noise: Noise, 
     peak = float(measured.omega[place])
     at = peak if own is None else abs(own.pole)
     share = at / abs(row.pole)
-    found: dict[str, Any] = {"peak": peak, "frequency": at / HERTZ, "frequency_ratio": share, "off": 100 * (share - 1)}
+    found: dict[str, Any] = {
+        "peak": peak,
+        "frequency": at / HERTZ,
+        "frequency_ratio": share,
+        "off": 100 * (share - 1),
+    }
     if own is None:
         return replace(row, **found, is_peak_only=True)
     of_damping, of_frequency = own.std.tolist()
@@ -427,7 +473,8 @@ class ResonanceShift(NamedTuple):
 
     before: Annotated[float | None, Quantity("start", "Hz", help="pole of the arm at the start of the fit")]
     after: Annotated[
-        float | None, Quantity("fitted", "Hz", help="pole of the fitted arm; none where it has none near the peak")
+        float | None,
+        Quantity("fitted", "Hz", help="pole of the fitted arm; none where it has none near the peak"),
     ]
     measured: Annotated[float, Quantity("measured", "Hz", help="peak of the measured response")]
 

@@ -24,14 +24,14 @@ from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.digits import join_words
 from tfarm.errors import require
+from tfarm.fitting.data import CONFIDENCE
+from tfarm.fitting.solve import FIT_SEED, OPEN_DEVIATION, Fitted, Solution, nearest_minimum, principal_axes
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 
-from .data import CONFIDENCE
-from .solve import FIT_SEED, OPEN_DEVIATION, Fitted, Solution, nearest_minimum, principal_axes
-
 SUFFIX = ".posterior.json"
-NO_VARIANCE = 1e-13  # of the largest variance: a smaller one is rounding
+# of the largest variance: a smaller one is rounding
+NO_VARIANCE = 1e-13
 
 
 class PosteriorNumber(StrictTable):
@@ -80,10 +80,15 @@ class Posterior(StrictTable):
         """Raise ParameterError, naming a number, unless the data determine all numbers once those are given."""
         rest = [n for n, key in enumerate(self.keys) if key not in ranged]
         sizes, axes = np.linalg.eigh(self.information[np.ix_(rest, rest)])
-        for axis in axes.T[sizes < 0.5 / OPEN_DEVIATION**2]:  # 0 or at least 1/OPEN_DEVIATION^2
+        # 0 or at least 1/OPEN_DEVIATION^2
+        for axis in axes.T[sizes < 0.5 / OPEN_DEVIATION**2]:
             key = self.keys[rest[abs(axis).argmax()]]
-            require(False, "posterior", key, "the data do not determine it: give a range of its own, "
-                    f"--over {key}=uniform:LOW,HIGH")  # fmt: skip
+            require(
+                False,
+                "posterior",
+                key,
+                f"the data do not determine it: give a range of its own, --over {key}=uniform:LOW,HIGH",
+            )
 
     def draws(self, ranged: Mapping[str, Real], normal: Real) -> Real:
         """Return values (rows, others) of the numbers that are not ranged, given the values (rows,) of those.
@@ -102,41 +107,56 @@ class Posterior(StrictTable):
         # unique: independent of the processor
         L = np.linalg.cholesky(P[np.ix_(rest, rest)])
         x_o = np.linalg.solve(L.T, normal.T - np.linalg.solve(L, P[np.ix_(rest, known)] @ x_r)).T
-        value, size = np.transpose([(self.numbers[n].value, self.numbers[n].size) for n in rest]).reshape(2, -1)
+        value, size = np.transpose([(self.numbers[n].value, self.numbers[n].size) for n in rest]).reshape(
+            2, -1
+        )
         return np.where(size > 0, value + size * x_o, value * np.exp(x_o))
 
 
-def posterior_of(found: Solution, fitted: Sequence[Fitted], not_determined: Sequence[str], arm: str) -> Posterior:
+def posterior_of(
+    found: Solution, fitted: Sequence[Fitted], not_determined: Sequence[str], arm: str
+) -> Posterior:
     """Return the posterior of a solution, of the arm's own numbers among the fitted ones; `arm` is its name."""
     own = found.problem.of_the_arm
     J, of_sensors = np.split(found.jacobian, [len(own)], axis=1)
-    sizes, axes = principal_axes(J - of_sensors @ (np.linalg.pinv(of_sensors) @ J))  # residuals that no sensor explains
+    # residuals that no sensor explains
+    sizes, axes = principal_axes(J - of_sensors @ (np.linalg.pinv(of_sensors) @ J))
     known = sizes >= 1.0 / OPEN_DEVIATION
     # of a coordinate: covariances of doubles keep no smaller deviation next to `OPEN_DEVIATION`
     spread = axes[known].T * np.maximum(1.0 / sizes[known], 1e-6)
     numbers = [
         PosteriorNumber(key=each.key, value=each.value, low=each.low, high=each.high, size=of.size)
         for each, of in zip(fitted, own, strict=False)
-    ]  # fmt: skip
-    return Posterior(format="tfarm posterior 1", arm=arm, numbers=numbers, covariance=(spread @ spread.T).tolist(),
-                     not_determined=list(not_determined))  # fmt: skip
+    ]
+    return Posterior(
+        format="tfarm posterior 1",
+        arm=arm,
+        numbers=numbers,
+        covariance=(spread @ spread.T).tolist(),
+        not_determined=list(not_determined),
+    )
 
 
 def load_posterior(path: str | os.PathLike[str]) -> Posterior:
     """Return the posterior of a file.  Raises ParameterError, naming the file, for anything else."""
-    found = validated_file(Posterior, path, 1 << 20, key="posterior", what=f"a {SUFFIX} file of tfarm fit --save")
+    found = validated_file(
+        Posterior, path, 1 << 20, key="posterior", what=f"a {SUFFIX} file of tfarm fit --save"
+    )
     n = len(found.numbers)
     covariance = found.covariance
     is_legal = (
-        0 < n == len(covariance) and all(len(row) == n for row in covariance)
+        0 < n == len(covariance)
+        and all(len(row) == n for row in covariance)
         and np.allclose(covariance, np.transpose(covariance), rtol=1e-9, atol=0.0)
         and np.linalg.eigvalsh(covariance)[0] >= -NO_VARIANCE * np.trace(covariance)
-    )  # fmt: skip
+    )
     remedy = f"give a symmetric, non-negative matrix of {n} rows and columns"
     file = os.fspath(path)
     require(is_legal, "covariance", covariance, remedy, file)
     for each in found.numbers:
-        require(each.size or each.value > 0, each.key, each.value, "give a positive number, as size is 0", file)
+        require(
+            each.size or each.value > 0, each.key, each.value, "give a positive number, as size is 0", file
+        )
     return found
 
 
@@ -150,7 +170,8 @@ class Repeats:
     response: Annotated[str, Quantity("response", help="response of which there are several records")]
     each: Annotated[list[dict[str, float]], Quantity(help="fitted numbers by each record alone")]
     intervals: Annotated[
-        dict[str, list[float]], Quantity("intervals by records", help="95 % of bootstrap draws of whole records")
+        dict[str, list[float]],
+        Quantity("intervals by records", help="95 % of bootstrap draws of whole records"),
     ]
     times_wider: Annotated[
         dict[str, float],

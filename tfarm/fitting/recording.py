@@ -47,13 +47,14 @@ from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulation, Simulator
 from tfarm.errors import MISSING, did_you_mean, list_within, must_be_known, name_file, require
 from tfarm.files import read_mat
+from tfarm.fitting.data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet
 from tfarm.records import frozen
 from tfarm.schema import Quantity, Table
 
-from .data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet
-
-MOST_SAMPLE = 1e70  # of a signal: the fourth power is a number, as spectra are squared
-LEAST_SAMPLES = 8  # of a record and of a segment
+# of a signal: the fourth power is a number, as spectra are squared
+MOST_SAMPLE = 1e70
+# of a record and of a segment
+LEAST_SAMPLES = 8
 
 
 @frozen(slots=True, kw_only=True)
@@ -103,7 +104,9 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
     name = os.fspath(path)
     if name.lower().endswith(".mat"):
         found, data = read_mat(name, MOST_RECORD_BYTES, key="record")
-        numbers = {each: value for each, value in found.items() if value.ndim == 2 and value.dtype.kind in "biuf"}
+        numbers = {
+            each: value for each, value in found.items() if value.ndim == 2 and value.dtype.kind in "biuf"
+        }
         held = {each: value.astype(float) for each, value in numbers.items()}
         units = dict.fromkeys(held, "")
         digest = hashlib.sha256(data).hexdigest()
@@ -133,13 +136,20 @@ def _columns(held: dict[str, Real], size: int) -> dict[str, Real]:
             columns |= {f"{name}.{number}": column for number, column in enumerate(value.T, start=1)}
     for name, column in columns.items():
         for at in np.flatnonzero(~(abs(column) <= MOST_SAMPLE))[:1]:
-            require(False, f"{name}, sample {at + 1}", float(column[at]), f"no finite number up to {MOST_SAMPLE:g}")
+            require(
+                False,
+                f"{name}, sample {at + 1}",
+                float(column[at]),
+                f"no finite number up to {MOST_SAMPLE:g}",
+            )
     return columns
 
 
 def _timing(times: Real) -> tuple[float, float, float]:
     """Start and period [s] of even samples, and the largest distance from them as a share of the period."""
-    require(times.size >= LEAST_SAMPLES, "samples", times.size, f"a record has {LEAST_SAMPLES} samples at least")
+    require(
+        times.size >= LEAST_SAMPLES, "samples", times.size, f"a record has {LEAST_SAMPLES} samples at least"
+    )
     steps = np.diff(times)
     usual = np.median(steps)
 
@@ -218,7 +228,9 @@ def compare_run(case: Case, measured: MeasuredRun) -> RunComparison:
     return RunComparison(measured, run)
 
 
-def departures(case: Case, measured: MeasuredRun, count: int, longer: float, share: float = 0.05) -> list[float]:
+def departures(
+    case: Case, measured: MeasuredRun, count: int, longer: float, share: float = 0.05
+) -> list[float]:
     """Return the times [s] after a measured run at which the computed hub angle is off its end, by a share of the step.
 
     The reference stays for that much `longer` [s], of 10,000 samples at most; `count` modes are in the loop.
@@ -287,14 +299,18 @@ class Estimate:
         ),
     ]
     note: Annotated[
-        str, Quantity("sampling of the record", help="unevenness of the sampling; empty where the samples are even")
+        str,
+        Quantity(
+            "sampling of the record", help="unevenness of the sampling; empty where the samples are even"
+        ),
     ]
 
     @property
     def resolution(
         self,
     ) -> Annotated[
-        float, Quantity("frequency resolution", "Hz", 4, "distance of the lines: one over the segment's length")
+        float,
+        Quantity("frequency resolution", "Hz", 4, "distance of the lines: one over the segment's length"),
     ]:
         """The distance of the lines [Hz]: 1/segment."""
         return 1.0 / self.segment
@@ -376,7 +392,9 @@ def frequency_response(
     )
 
 
-def _estimated(estimator: str, x: Real, y: Real, how: dict[str, Any]) -> tuple[NDArray[np.intp], Complex, Real]:
+def _estimated(
+    estimator: str, x: Real, y: Real, how: dict[str, Any]
+) -> tuple[NDArray[np.intp], Complex, Real]:
     """The lines that the input has power in, the response and the coherence there.
 
     Without the line at 0 and the last one, at half the rate of sampling, which are real.
@@ -393,7 +411,11 @@ def _estimated(estimator: str, x: Real, y: Real, how: dict[str, Any]) -> tuple[N
     S_yy = S_yy[lines]
     cross = abs(S_xy[lines])
     with np.errstate(divide="ignore", invalid="ignore"):
-        sizes = {"H1": cross / S_xx, "H2": np.where(cross == 0, 0.0, S_yy / cross), "Hv": np.sqrt(S_yy / S_xx)}
+        sizes = {
+            "H1": cross / S_xx,
+            "H2": np.where(cross == 0, 0.0, S_yy / cross),
+            "Hv": np.sqrt(S_yy / S_xx),
+        }
         phase = np.where(cross == 0, 1.0, S_xy[lines] / cross)
         coherence = np.where(S_yy > 0, cross**2 / (S_xx * S_yy), 0.0)
     return lines, sizes[estimator] * phase, np.clip(coherence, 0.0, 1.0)

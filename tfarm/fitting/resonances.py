@@ -21,19 +21,20 @@ from numpy.typing import NDArray
 
 from tfarm.arrays import Complex, Real
 from tfarm.errors import require
+from tfarm.fitting.data import Measured, in_parts
 from tfarm.moved import moved
 from tfarm.records import frozen
 from tfarm.response.frequency import HERTZ
-
-from .data import Measured, in_parts
 
 _DECAYS = "tfarm.fitting.decays"
 __getattr__ = moved(
     __name__, {"DecayMode": _DECAYS, "Ring": f"{_DECAYS}:RingdownFit", "ring": f"{_DECAYS}:fit_ringdown"}
 )
 
-UNPAIRED = 0.3  # of ln w: what a peak or a pole in the band costs without a partner; so partners are 1.8 apart at most
-PARTNERS_BEYOND = 1.8  # times the ends of the range: partners are looked for up to there
+# of ln w: what a peak or a pole in the band costs without a partner; so partners are 1.8 apart at most
+UNPAIRED = 0.3
+# times the ends of the range: partners are looked for up to there
+PARTNERS_BEYOND = 1.8
 
 
 @frozen(slots=True, kw_only=True)
@@ -113,7 +114,13 @@ def must_be_in_unit(data: Measured, sigma: Real, poles: Complex) -> None:
         # of ln w: how well the peaks fit in the other unit, in the mean and in what they differ by
         fits = away.size == peaks.size and abs(away.mean()) < 0.3 and np.ptp(away) < 0.15
         remedy = f"its peaks are {1 / factor:.3g} times the arm's frequencies: {words}"
-        require(not (is_better and fits), f"{data.name} first peak", f"{peaks[0] / HERTZ:.4g} Hz", remedy, data.source)
+        require(
+            not (is_better and fits),
+            f"{data.name} first peak",
+            f"{peaks[0] / HERTZ:.4g} Hz",
+            remedy,
+            data.source,
+        )
 
 
 def project(columns: Real, y: Real) -> tuple[Real, Real]:
@@ -179,7 +186,11 @@ def _around(data: Measured, place: int) -> slice:
     def end(way: int) -> int:
         at = place
         lowest = size[place]
-        while 0 <= at + way < size.size and size[at + way] < 2 * lowest and (away[at] < reach or abs(at - place) < 3):
+        while (
+            0 <= at + way < size.size
+            and size[at + way] < 2 * lowest
+            and (away[at] < reach or abs(at - place) < 3)
+        ):
             at += way
             lowest = min(lowest, size[at])
         return at

@@ -30,15 +30,16 @@ from scipy.special import chdtrc, ndtri, stdtrit
 from tfarm.arm.schema import file_key
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
+from tfarm.fitting.data import CONFIDENCE, in_parts
+from tfarm.fitting.model import Problem, penalize
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.stopping import Progress
 
-from .data import CONFIDENCE, in_parts
-from .model import Problem, penalize
-
-LINES = 400  # of a response, at most
-FIT_SEED = 852780  # of all that a fit draws: the number of the paper's article, any would do
+# of a response, at most
+LINES = 400
+# of all that a fit draws: the number of the paper's article, any would do
+FIT_SEED = 852780
 
 
 def start_by(problem: Problem, draws: int, shares: Sequence[float]) -> tuple[Problem, Real]:
@@ -57,9 +58,15 @@ def start_by(problem: Problem, draws: int, shares: Sequence[float]) -> tuple[Pro
 
         # equation errors beyond 0.1 count less and less
         found = least_squares(
-            penalize(errors, first), first, bounds=thin.bounds, loss="soft_l1", f_scale=0.1, max_nfev=40, xtol=1e-4,
+            penalize(errors, first),
+            first,
+            bounds=thin.bounds,
+            loss="soft_l1",
+            f_scale=0.1,
+            max_nfev=40,
+            xtol=1e-4,
             ftol=1e-4,
-        )  # fmt: skip
+        )
         point = found.x
     _, sizes, axes = np.linalg.svd(np.asarray(found.jac), full_matrices=False)
     deviation = math.sqrt(2 * found.cost / found.fun.size) / sizes
@@ -131,10 +138,14 @@ def thin_problem(problem: Problem, most: int) -> Problem:
     return replace(problem, responses=tuple(responses))
 
 
-MOST_EVALUATIONS = 60  # evaluations from one start
-OPEN_DEVIATION = 1.0  # of ln p: a combination with a larger deviation (a factor of e) is not determined by the data
-SAME_SUM = 0.1  # of a sum of squares: a smaller difference is none
-EXCLUDED = 16.0  # of a sum of squares: noise alone makes up an effect of four deviations once in 15,000 fits
+# evaluations from one start
+MOST_EVALUATIONS = 60
+# of ln p: a combination with a larger deviation (a factor of e) is not determined by the data
+OPEN_DEVIATION = 1.0
+# of a sum of squares: a smaller difference is none
+SAME_SUM = 0.1
+# of a sum of squares: noise alone makes up an effect of four deviations once in 15,000 fits
+EXCLUDED = 16.0
 
 
 @frozen
@@ -154,7 +165,8 @@ class Solution:
     def chi_squared(
         self,
     ) -> Annotated[
-        float, Quantity("chi-squared", digits=4, help="sum of squared residuals over their standard deviations")
+        float,
+        Quantity("chi-squared", digits=4, help="sum of squared residuals over their standard deviations"),
     ]:
         """The sum of squared residuals."""
         return float(self.residuals @ self.residuals)
@@ -309,12 +321,15 @@ def _rescaled(found: Solution) -> Solution:
         share = found.residuals.size / max(found.freedom, 1)
         for each, own in zip(found.problem.responses, found.parts, strict=True):
             factor = 1.0 if each.noise.is_known else math.sqrt((own @ own) / own.size * share)
-            responses.append(replace(each, noise=replace(each.noise, sigma=each.noise.sigma * max(factor, 1e-12))))
+            responses.append(
+                replace(each, noise=replace(each.noise, sigma=each.noise.sigma * max(factor, 1e-12)))
+            )
         found = nearest_minimum(replace(found.problem, responses=tuple(responses)), found.point)
     return found
 
 
-TAKES_PART = 0.1  # of a unit vector: a smaller component has no part in it
+# of a unit vector: a smaller component has no part in it
+TAKES_PART = 0.1
 
 
 @frozen(kw_only=True)
@@ -325,21 +340,29 @@ class Fitted:
     """
 
     label: Annotated[str, Quantity("number", help="name and symbol of the fitted number")]
-    key: Annotated[str, Quantity("key", help="key of the number in the arm's file, or the sensor's gain or delay")]
+    key: Annotated[
+        str, Quantity("key", help="key of the number in the arm's file, or the sensor's gain or delay")
+    ]
     unit: Annotated[str, Quantity("unit", help="SI unit of the number")]
     value: Annotated[float, Quantity("value", help="best value")]
     low: Annotated[
         float | None,
-        Quantity("95 % interval from", help="lower end of the interval; none where the data set no lower bound"),
+        Quantity(
+            "95 % interval from", help="lower end of the interval; none where the data set no lower bound"
+        ),
     ]
     high: Annotated[
         float | None, Quantity("to", help="upper end of the interval; none where the data set no upper bound")
     ]
     deviation: Annotated[
         float | None,
-        Quantity("standard deviation", digits=3, key="std", help="by the covariance of the linearised residuals"),
+        Quantity(
+            "standard deviation", digits=3, key="std", help="by the covariance of the linearised residuals"
+        ),
     ]
-    identified: Annotated[bool, Quantity("identified", help="whether the data bound the number on both sides")]
+    identified: Annotated[
+        bool, Quantity("identified", help="whether the data bound the number on both sides")
+    ]
     start: Annotated[float, Quantity(help="value at which the search began")]
 
 
@@ -418,7 +441,9 @@ def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float | None, 
     along = np.eye(found.point.size)[n]
 
     def excess(at: float) -> float:
-        return sum_of_squares(found.problem, found.point + (at - own) * along) - found.chi_squared - quantile**2
+        return (
+            sum_of_squares(found.problem, found.point + (at - own) * along) - found.chi_squared - quantile**2
+        )
 
     def end(way: int) -> float | None:
         # of ln p: where a number that does not matter is tried

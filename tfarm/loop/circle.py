@@ -55,13 +55,12 @@ from tfarm.spectrum import modes
 from tfarm.spectrum.box import TOWARD_SINGULAR, Box, winding_number
 from tfarm.spectrum.naming import function_of
 
-ARCS = 64  # of half the circle to begin with
-SHORTEST_ARC = 1e-13  # rad: no arc is cut further, as its ends are known to a few last bits
-PIECES_OF_ARC = 4  # into which one is cut that is too long
-MOST_ARCS = 60_000  # a loop that takes more is not shown
-ON_IT = 1e-100  # distance from the circle of a pole on it: its disc is wide, and contains 0
-ROUNDINGS = 8  # of a factor of the law: of its root, of its middle, and of the products
-SURE = 0.1  # by which two quadratures of an absolute value may differ; the larger counts, with as much again
+# of half the circle to begin with
+ARCS = 64
+# into which one is cut that is too long
+PIECES_OF_ARC = 4
+# by which two quadratures of an absolute value may differ; the larger counts, with as much again
+SURE = 0.1
 
 
 @frozen
@@ -135,6 +134,10 @@ class Circle:
 
         None if it is not certified.
         """
+        # rad: no arc is cut further, as its ends are known to a few last bits
+        shortest_arc = 1e-13
+        # a loop that takes more is not shown
+        most_arcs = 60_000
         while True:
             F = self.characteristic(weights)
             rough = ~(abs(F.middle) > F.radius)
@@ -144,7 +147,7 @@ class Circle:
                 end = np.angle(F.middle[-1])
                 return -round(float(steps.sum() + _to_the_axis(start) - _to_the_axis(end)) / np.pi)
             width = self.high[rough] - self.low[rough]
-            if width.min() < SHORTEST_ARC or (PIECES_OF_ARC - 1) * rough.sum() + rough.size > MOST_ARCS:
+            if width.min() < shortest_arc or (PIECES_OF_ARC - 1) * rough.sum() + rough.size > most_arcs:
                 return None
             self._cut(rough)
 
@@ -178,7 +181,9 @@ class Circle:
         order = self.loop.in_z.poles.size
         sums = self.summed(arcs, self.weights)
         n = len(self.orders) - 1
-        signals = [self._output(row, arcs, sums[row] + sums[n + row] * arcs.turned(1), sums[-1]) for row in range(n)]
+        signals = [
+            self._output(row, arcs, sums[row] + sums[n + row] * arcs.turned(1), sums[-1]) for row in range(n)
+        ]
         found = [arcs.x]
         for _, row, _, roots in self.terms:
             term = root_ratio(arcs.x, roots[roots != 0]) * arcs.turned(order - roots.size)
@@ -198,12 +203,13 @@ class Circle:
         held = of_poles + late.times(at_rest) + Discs(0 * x.middle, self.missing[row])
         total = power(x, order) * held
         push = arcs.polynomial(pulse.sampling.remaining, pulse.sampling.late)
-        if order == 2:  # then there is no 1/s: an arm that turns freely has no friction at the hub
+        # then there is no 1/s: an arm that turns freely has no friction at the hub
+        if order == 2:
             total = total + ((push * late).times(T) + x * arcs.polynomial(*pulse.ramps)).times(twice) * late
         elif order == 1:
-            total = total + (push * late if self.slow_hub_pole is None else pair * self._slow_hub_pair(arcs)).times(
-                once
-            )
+            total = total + (
+                push * late if self.slow_hub_pole is None else pair * self._slow_hub_pair(arcs)
+            ).times(once)
         return total * arcs.turned(pulse.sampling.whole_delay)
 
     # ------------------------------------------------------------ arcs
@@ -235,10 +241,13 @@ class Circle:
         T = sampling.period
         late = sampling.late
         is_braked = np.arange(p.size) == (-1 if self.slow_hub_pole is None else self.slow_hub_pole)
-        share = (plant.residues + np.outer(plant.rigid[:, 1], is_braked)) / p  # the rest is in `_slow_hub_pair`
+        # the rest is in `_slow_hub_pair`
+        share = (plant.residues + np.outer(plant.rigid[:, 1], is_braked)) / p
         now = np.expm1(p * (T - late))
         before = np.exp(p * (T - late)) * np.expm1(p * late)
-        return np.vstack([*np.where(self.kept, [share * now, share * before], 0.0), np.where(is_braked, -p, 0.0)])
+        return np.vstack(
+            [*np.where(self.kept, [share * now, share * before], 0.0), np.where(is_braked, -p, 0.0)]
+        )
 
     @cached_property
     def slow_hub_pole(self) -> int | None:
@@ -258,10 +267,12 @@ class Circle:
 
     def summed(self, arcs: Arcs, weights: Complex) -> Discs:
         """sum over the poles p of the plant of weight/(z - b) on arcs: discs (weights, arcs)."""
+        # distance from the circle of a pole on it: its disc is wide, and contains 0
+        on_it = 1e-100
         p = self.loop.plant.poles
         T = self.loop.chain.sampling.period
         b = np.exp(p * T)
-        room = np.maximum(-np.expm1(p.real * T), ON_IT)
+        room = np.maximum(-np.expm1(p.real * T), on_it)
         blur = MACHINE_EPS * (4 + abs(p * T))
         middles = []
         radii = []
@@ -269,7 +280,7 @@ class Circle:
         for some in np.array_split(np.arange(arcs.half.size), 1 + arcs.half.size * p.size // 2**19):
             away = np.exp(1j * arcs.middle[some])[:, None] - b
             h = arcs.half[some][:, None]
-            away = np.where(away == 0, ON_IT, away)
+            away = np.where(away == 0, on_it, away)
             near = 1 / abs(away)
             least = 1 / np.maximum(1 / near - h, room)
             change = np.minimum(h * near * least, near + least) + blur * near**2
@@ -286,11 +297,15 @@ def power(x: Discs, n: int) -> Discs:
 
 def root_ratio(x: Discs, roots: Complex) -> Discs:
     """prod((z - r)/z) for x = 1 - 1/z in discs, each root r given as r - 1."""
+    # of a factor of the law: of its root, of its middle, and of the products
+    roundings = 8
     factors = x.middle[:, None] * (1 + roots) - roots
     sizes = abs(factors)
-    blur = MACHINE_EPS * ROUNDINGS * (abs(x.middle)[:, None] * abs(1 + roots) + abs(roots))
+    blur = MACHINE_EPS * roundings * (abs(x.middle)[:, None] * abs(1 + roots) + abs(roots))
     most = (sizes + x.radius[:, None] * abs(1 + roots) + blur).prod(axis=1)
-    return Discs(factors.prod(axis=1), most - sizes.prod(axis=1) + MACHINE_EPS * ROUNDINGS * (1 + roots.size) * most)
+    return Discs(
+        factors.prod(axis=1), most - sizes.prod(axis=1) + MACHINE_EPS * roundings * (1 + roots.size) * most
+    )
 
 
 def _to_the_axis(angle: float) -> float:
@@ -385,7 +400,9 @@ def _left_of(loop: Sampled, line: float, top: float) -> Real | None:
     # the first panel up the line is ten times finer than its distance from the axis
     up = _integral(lambda w: sizes(-line + 1j * w), np.r_[0.0, _graded(line / 10, top)])
     # along the top from 0.01 of 1/remaining on, until e^-45 = 3e-20 is left
-    away = _integral(lambda c: sizes(-c + 1j * top), line + np.r_[0.0, _graded(0.01 / remaining, 45.0 / remaining)])
+    away = _integral(
+        lambda c: sizes(-c + 1j * top), line + np.r_[0.0, _graded(0.01 / remaining, 45.0 / remaining)]
+    )
     return None if up is None or away is None else (up + away) * (2 / np.pi) * (1 + 2 * SURE)
 
 
@@ -413,7 +430,8 @@ def _of_the_filter(loop: Sampled, line: float) -> Real:
     sampling = loop.chain.sampling
     plant = loop.plant
     corner = sampling.antialias_corner
-    if corner >= line or not any(loop.rig.analog):  # then none of the kept poles is it, and the integral has it right
+    # then none of the kept poles is it, and the integral has it right
+    if corner >= line or not any(loop.rig.analog):
         return np.zeros(len(loop.rig.analog))
     own = plant.mode.size - 1
     arm = loop.rig.exact(np.array([-corner + 0j]))[:, 0]

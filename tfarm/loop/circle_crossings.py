@@ -38,25 +38,27 @@ from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.gains import most_gain
 
-FACTOR = "gain"  # the name of a factor on the whole law
-MOST_FACTOR = 1e9  # with more its gain is beyond any number
-MOST_GAINS = 4000  # of a map, along one gain
-ENDS_AT = (-0.9, 0.3, 0.9)  # K2 at which upright edges are searched, times `input_per_torque`
-MOST_COLUMNS = 400  # of K1 in a picture
-OFF_EDGE = 1e-9  # relative: distance to either side of such an edge at which a region is cut
+# the name of a factor on the whole law
+FACTOR = "gain"
+# K2 at which upright edges are searched, times `input_per_torque`
+ENDS_AT = (-0.9, 0.3, 0.9)
+# of K1 in a picture
+MOST_COLUMNS = 400
 
 
 def line_of(loop: Sampled, name: str) -> Line:
     """The line of one number of the law, or of `FACTOR`.  A gain at the hub ends at `most_gain`."""
+    # with more its gain is beyond any number
+    most_factor = 1e9
     unit = np.zeros(loop.row.size)
     if name == FACTOR:
         unit[1:] = loop.weights
         # the least factor on a law that is searched: with less it is none
-        return Line.of(loop.row, unit, 1.0, 1e-9, MOST_FACTOR)
+        return Line.of(loop.row, unit, 1.0, 1e-9, most_factor)
     place = 1 + loop.part(name)
     value = loop.number(name)
     gain = ON.get(name, name)
-    most = most_gain(loop.plant.arm, gain) if gain in NAMES else MOST_FACTOR * (abs(value) or 1.0)
+    most = most_gain(loop.plant.arm, gain) if gain in NAMES else most_factor * (abs(value) or 1.0)
     unit[place] = 1.0
     return Line.of(loop.row, unit, value, -most, most)
 
@@ -76,7 +78,8 @@ def crossings_along(grid: CircleGrid, lines: Sequence[Line]) -> list[Crossings]:
         ways = [1 if ((others @ rows) * (alone @ rows).conj()).imag >= 0 else -1 for rows in (first, last)]
         here.append(Crossing(_real_gain(others @ at_end, alone @ at_end), math.pi, ways[1]))
         (lowest, at_one), (least, moving) = (_lowest(grid.rig.near_one(each)) for each in (others, alone))
-        if least <= lowest:  # A and B are of the same order in x = 1 - 1/z, or A is of a higher one: it crosses at 0
+        # A and B are of the same order in x = 1 - 1/z, or A is of a higher one: it crosses at 0
+        if least <= lowest:
             static = _real_gain(at_one, moving) if least == lowest else 0.0
             here.append(Crossing(static, 0.0, -ways[0]))
         found.append(Crossings.of(here).within(low, high))
@@ -133,22 +136,31 @@ class GainMap(OfLoop, PlaneOfCounts):
     """
 
     loop: Sampled
-    vary: Annotated[tuple[str, str], Quantity("plane of",
-            help="names of the two numbers of the controller that vary, the first across")]  # fmt: skip
+    vary: Annotated[
+        tuple[str, str],
+        Quantity("plane of", help="names of the two numbers of the controller that vary, the first across"),
+    ]
     x: Annotated[Real, Quantity(curve=True, help="values of the first number, ascending")]
     y: Annotated[Real, Quantity(curve=True, help="values of the second number, ascending")]
     unstable: NDArray[np.int64]
     crossings: list[Crossings]
 
     @property
-    def finding(self) -> Annotated[str, Quantity("stability region",
-            help="grid points of the plane without unstable poles")]:  # fmt: skip
+    def finding(
+        self,
+    ) -> Annotated[str, Quantity("stability region", help="grid points of the plane without unstable poles")]:
         """Number of points of the grid at which the loop is stable."""
         return super().finding
 
     @property
-    def counts(self) -> Annotated[NDArray[np.int64], Quantity(key="unstable_poles",
-            help="unstable poles at each point, without z = 1 of a free hub angle")]:  # fmt: skip
+    def counts(
+        self,
+    ) -> Annotated[
+        NDArray[np.int64],
+        Quantity(
+            key="unstable_poles", help="unstable poles at each point, without z = 1 of a free hub angle"
+        ),
+    ]:
         """Unstable poles (len(y), len(x))."""
         return self.unstable.T
 
@@ -162,8 +174,10 @@ def sampled_map(
     (D-decomposition) for two gains of its parts, and along such a gain for each value of any other number.  For two
     others poles are counted at every point.  Raises ConvergenceError where crossings and a count by eigenvalues differ.
     """
-    x = check_ascending(vary[0], x, 1, MOST_GAINS)
-    y = check_ascending(vary[1], y, 1, MOST_GAINS)
+    # of a map, along one gain
+    most_gains = 4000
+    x = check_ascending(vary[0], x, 1, most_gains)
+    y = check_ascending(vary[1], y, 1, most_gains)
     across, up = (loop.place(name) for name in vary)
     if up is None and across is not None:
         turned = sampled_map(loop, y, x, (vary[1], vary[0]))
@@ -171,13 +185,19 @@ def sampled_map(
     loops = {value: loop.having(vary[0], value) for value in x.tolist()}
     if up is None:
         points = [[each.having(vary[1], value) for value in y.tolist()] for each in loops.values()]
-        return GainMap(loop, vary, x, y, np.array([[each.poles.unstable for each in row] for row in points]), [])
+        return GainMap(
+            loop, vary, x, y, np.array([[each.poles.unstable for each in row] for row in points]), []
+        )
     at = _off_the_edge(y)
     lines = [line_of(each, vary[1]) for each in loops.values()]
     if across is None:
         there = np.array([each.having(vary[1], at).poles.unstable for each in loops.values()])
-        found = [crossings_along(each.rig.grid, [line])[0] for each, line in zip(loops.values(), lines, strict=True)]
-    else:  # all loops have one grid, and a count in one column those of the row
+        found = [
+            crossings_along(each.rig.grid, [line])[0]
+            for each, line in zip(loops.values(), lines, strict=True)
+        ]
+    else:
+        # all loops have one grid, and a count in one column those of the row
         start = loop.having(vary[0], _off_the_edge(x)).having(vary[1], at)
         row, *found = crossings_along(loop.rig.grid, [line_of(start, vary[0]), *lines])
         there = start.poles.unstable + row.passed(x) - row.passed(start.number(vary[0]))
@@ -227,10 +247,16 @@ def ends_of_K1(loop: Sampled) -> Real:
 
 def with_both_sides(K1: Real, ends: Real) -> Real:
     """Values of K1, ascending, with both sides of each upright edge."""
-    return np.unique(np.concatenate([K1, ends * (1 - OFF_EDGE), ends * (1 + OFF_EDGE)]))
+    # relative: distance to either side of such an edge at which a region is cut
+    off_edge = 1e-9
+    return np.unique(np.concatenate([K1, ends * (1 - off_edge), ends * (1 + off_edge)]))
 
 
 def _off_the_edge(values: Real) -> float:
     """A gain inside the range that is on no rounded edge."""
     # the golden section of a range is on no rounded number and no grid
-    return float(values[0] + 0.6180339887498949 * (values[-1] - values[0])) if values.size > 1 else float(values[0])
+    return (
+        float(values[0] + 0.6180339887498949 * (values[-1] - values[0]))
+        if values.size > 1
+        else float(values[0])
+    )

@@ -45,24 +45,25 @@ from tfarm.spectrum.frequencies import ARMS_KEPT
 from tfarm.spectrum.gains import LEAST_UNITS, check_gains
 from tfarm.spectrum.table import first_frequency
 
-FAR_RIGHT = (1e5, 1e6, 1e7)  # of w1: far right, where L of an improper law must fall, and poles come from infinity
-FALL_FACTOR = 0.5  # L must fall by this there, from one to the next
-SOMEWHERE = 0.31 + 0.71j  # of w1: where a signal is tested for being fed back at all; no law has its zero there
-NEAREST_TO_ORIGIN = 1e-12  # of w1: where a function, its zeros at 0 divided out, is taken for its value at 0
-ROUNDING_AT_REST = 1e-13  # of the terms of D: less is left by their rounding where they cancel at s = 0
-ORDER_READ_AT = (2e-5, 1e-5)  # of w1: where the order of a zero at s = 0 is read off
+# of w1: far right, where L of an improper law must fall, and poles come from infinity
+FAR_RIGHT = (1e5, 1e6, 1e7)
+# of w1: where a signal is tested for being fed back at all; no law has its zero there
+SOMEWHERE = 0.31 + 0.71j
+# of w1: where a function, its zeros at 0 divided out, is taken for its value at 0
+NEAREST_TO_ORIGIN = 1e-12
+# of w1: where the order of a zero at s = 0 is read off
+ORDER_READ_AT = (2e-5, 1e-5)
 # distances from a steep place, as shares of its frequency
-NEAREST_TO_STEEP = 1e-10
-FARTHEST_FROM_STEEP = 0.06
-POINTS_NEAR_STEEP = 14  # of a grid on either side of a steep place, one and a half a decade
-POINTS_BETWEEN_STEEP = 24  # and between two of them
-STEEP_BEYOND = 1.05  # of the end of a grid: the points of steep places up to there reach below it
-SLOWEST = 1e-6  # of the first steep place: where a grid begins, as nothing bends there
-POINTS_BELOW_STEEP = 60  # from there to that place, ten a decade
-QUIET_REACH = 100.0  # times a band: the end of the range beyond it in which |L| is evaluated, two decades of its fall
-MOST_RESONANCES = 2000  # evaluated in it: 20 ms
-LONG_PATH = 1000  # points, and three at each: a contour that the loops of other laws have too, whose values are kept
-MOST_BAND_MODES = 150  # flexible: in a band; beyond, poles are not determined without a theorem or small gain
+# of the first steep place: where a grid begins, as nothing bends there
+SLOWEST = 1e-6
+# times a band: the end of the range beyond it in which |L| is evaluated, two decades of its fall
+QUIET_REACH = 100.0
+# evaluated in it: 20 ms
+MOST_RESONANCES = 2000
+# points, and three at each: a contour that the loops of other laws have too, whose values are kept
+LONG_PATH = 1000
+# flexible: in a band; beyond, poles are not determined without a theorem or small gain
+MOST_BAND_MODES = 150
 
 
 @frozen
@@ -99,7 +100,9 @@ class ContinuousLoop(Loop):
         return self.case.feedback
 
     @property
-    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
+    def controller(
+        self,
+    ) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller, without gains of 0."""
         return controller(self.case.law, self.arm)
 
@@ -173,7 +176,8 @@ class ContinuousLoop(Loop):
         for name, order, numerator in zip(self.law.signals, self.signals.orders, numerators, strict=True):
             for part in self.law.parts if numerator else ():
                 own = part.block.zeros_at_origin(part.signals.index(name)) if name in part.signals else None
-                if own is not None:  # and the integrators of the other parts
+                # and the integrators of the other parts
+                if own is not None:
                     terms.append(order + own + integrators - int((part.block.poles == 0).sum()))
         return min(terms) + self.resting_zeros
 
@@ -184,10 +188,14 @@ class ContinuousLoop(Loop):
         The orders of the terms of D do not show that they cancel there, but their values do.  The mean on both sides
         of 0 has no terms odd in s.
         """
+        # of the terms of D: less is left by their rounding where they cancel at s = 0
+        rounding_at_rest = 1e-13
         s = first_frequency(self.arm) * np.array([NEAREST_TO_ORIGIN, -NEAREST_TO_ORIGIN, *ORDER_READ_AT]) + 0j
-        with np.errstate(all="ignore"):  # L is infinite at a pole of the rig or of the law: then nothing cancels
+        # L is infinite at a pole of the rig or of the law: then nothing cancels
+        with np.errstate(all="ignore"):
             right, left, farther, nearer = 1 + self.loop_function(s)
-            cancels = abs(right + left) <= 2 * ROUNDING_AT_REST and abs(right) < 1  # else odd terms dominate
+            # else odd terms dominate
+            cancels = abs(right + left) <= 2 * rounding_at_rest and abs(right) < 1
         return round(float(np.log2(abs(farther / nearer)))) if cancels else 0
 
     def characteristic(self, s: Complex) -> tuple[Complex, Complex]:
@@ -207,7 +215,8 @@ def by_differences(
 ) -> Analytic:
     """D/s^at_zero at s (n,), not 0, with slopes from differences; `characteristic` gives D e^{-scale} and scale."""
     h = difference_steps(k, s)
-    with np.errstate(over="ignore", invalid="ignore"):  # far from where it is large: no number, and no start
+    # far from where it is large: no number, and no start
+    with np.errstate(over="ignore", invalid="ignore"):
         D, scale = characteristic(np.array([s, s + h, s - h]))
         up, down = D[1:] * np.exp(scale[1:] - scale[0])
         return deflate(D[0], (up - down) / (2 * h), scale[0], s, at_zero)
@@ -215,6 +224,8 @@ def by_differences(
 
 def _must_not_be_algebraic(loop: ContinuousLoop) -> None:
     """Raise ParameterError for a law whose loop function does not fall far right: the loop would be algebraic."""
+    # L must fall by this there, from one to the next
+    fall_factor = 0.5
     arm = loop.arm
     law = loop.law
     moment = [part for part in law.parts if "root_moment" in part.signals and part.block.excess == 0]
@@ -227,10 +238,13 @@ def _must_not_be_algebraic(loop: ContinuousLoop) -> None:
     drive, numerators, _ = loop.signals.parts(far)
     entries, whole = law.polynomials(far)
     with np.errstate(all="ignore"):
-        size = abs((entries * numerators).sum(axis=0) / (drive * whole))  # L without its delay
-    falls = np.isfinite(size).all() and (size[1:] < FALL_FACTOR * size[:-1]).all()
+        # L without its delay
+        size = abs((entries * numerators).sum(axis=0) / (drive * whole))
+    falls = np.isfinite(size).all() and (size[1:] < fall_factor * size[:-1]).all()
     worst = next(p for p in law.parts if p.block.excess > 0)
-    remedy = "the degree of its numerator is too high for this signal, so the loop is algebraic; add a pole to den"
+    remedy = (
+        "the degree of its numerator is too high for this signal, so the loop is algebraic; add a pole to den"
+    )
     require(falls, f"law.{worst.signals[0]}.num", worst.block.excess, remedy)
 
 
@@ -245,7 +259,9 @@ def _must_be_possible(arm: Arm, gains: HubFeedback, least: float) -> None:
 @lru_cache(maxsize=ARMS_KEPT)
 def steep_places(arm: Arm, up_to: float) -> Any:
     """Natural frequencies [rad/s] with the arm's own hub, with a locked one and with none, ascending; read-only."""
-    pin = replace(arm, hub=replace(arm.hub, inertia=0.0, friction=0.0, stiffness=0.0), motor=None, input="hub_torque")
+    pin = replace(
+        arm, hub=replace(arm.hub, inertia=0.0, friction=0.0, stiffness=0.0), motor=None, input="hub_torque"
+    )
     others = (arm, arm.having(hub_inertia=math.inf), pin)
     places = np.unique(np.concatenate([flexible_frequencies(each, up_to) for each in others]))
     places.flags.writeable = False
@@ -255,15 +271,26 @@ def steep_places(arm: Arm, up_to: float) -> Any:
 @lru_cache(maxsize=ARMS_KEPT)
 def grid(arm: Arm, up_to: float) -> Any:
     """Frequencies [rad/s] from a millionth of the first natural one to `up_to`, dense at steep places; read-only."""
-    places = np.asarray(steep_places(arm, STEEP_BEYOND * up_to))
+    # distances from a steep place, as shares of its frequency
+    nearest_to_steep = 1e-10
+    farthest_from_steep = 0.06
+    # of a grid on either side of a steep place, one and a half a decade
+    points_near_steep = 14
+    # and between two of them
+    points_between_steep = 24
+    # of the end of a grid: the points of steep places up to there reach below it
+    steep_beyond = 1.05
+    # from there to that place, ten a decade
+    points_below_steep = 60
+    places = np.asarray(steep_places(arm, steep_beyond * up_to))
     lowest = SLOWEST * min(up_to, places[0] if places.size else up_to)
-    away = np.geomspace(NEAREST_TO_STEEP, FARTHEST_FROM_STEEP, POINTS_NEAR_STEEP)
+    away = np.geomspace(nearest_to_steep, farthest_from_steep, points_near_steep)
     close = (places[:, None] * (1 + np.r_[-away[::-1], away])).ravel()
     corners = np.r_[lowest, places[places < up_to], up_to]
     between = np.concatenate(
-        [np.linspace(a, b, POINTS_BETWEEN_STEEP, endpoint=False) for a, b in itertools.pairwise(corners)]
+        [np.linspace(a, b, points_between_steep, endpoint=False) for a, b in itertools.pairwise(corners)]
     )
-    slow = np.geomspace(lowest, corners[1], POINTS_BELOW_STEEP)
+    slow = np.geomspace(lowest, corners[1], points_below_steep)
     omega = np.unique(np.concatenate([close, between, slow]))
     omega = np.append(omega[(omega >= lowest) & (omega < up_to)], up_to)
     omega.flags.writeable = False
@@ -286,7 +313,9 @@ def quiet_places(arm: Arm, band: float, points: int) -> Any:
     """
     places = band * np.geomspace(1.0, QUIET_REACH, points)
     if arm.least_damping:
-        first, last = (modes_below(arm, min(end, 2 / arm.least_damping)) for end in (band, QUIET_REACH * band))
+        first, last = (
+            modes_below(arm, min(end, 2 / arm.least_damping)) for end in (band, QUIET_REACH * band)
+        )
         many = min(last - first, MOST_RESONANCES)
         if many:
             places = np.unique(np.r_[places, modes(arm, first + many).natural_frequency[-many:]])

@@ -24,7 +24,9 @@ from tfarm.schema import At, Quantity
 from tfarm.spectrum.table import first_frequency
 
 IN_RANGE = Quantity(
-    "margins in the frequency range", key="in_range", help="of L(iw) up to the end of the verdict's frequency range"
+    "margins in the frequency range",
+    key="in_range",
+    help="of L(iw) up to the end of the verdict's frequency range",
 )
 
 
@@ -39,41 +41,63 @@ class LoopCurve:
     arm: Arm
     law: Law
     stability: Annotated[str, Quantity("stability", help="stable, marginal or unstable")]
-    period: Annotated[float | None, Quantity("sampling period", "s", help="of a sampled loop, else null")] = None
+    period: Annotated[float | None, Quantity("sampling period", "s", help="of a sampled loop, else null")] = (
+        None
+    )
     note: Annotated[str, Quantity("note", help="damping with which an undamped arm is drawn")] = ""
     omega: Annotated[Real, Quantity("frequency", "rad/s", curve=True, help="frequencies of the curve")]
     L: Annotated[Complex, Quantity("L", curve=True, help="loop function at these frequencies")]
     margins: Annotated[LoopMargins | None, IN_RANGE]
-    continuous: Annotated[LoopCurve | None, Quantity("continuous-time loop", help="of a sampled loop, else null")] = (
-        None
-    )
+    continuous: Annotated[
+        LoopCurve | None, Quantity("continuous-time loop", help="of a sampled loop, else null")
+    ] = None
 
     @property
-    def gain_margin(self) -> Annotated[At | None, Quantity("gain margin, upwards", "dB", key="gain_margin_db",
-            help="increase of the loop gain up to which the loop stays stable; null unless it is stable")]:  # fmt: skip
+    def gain_margin(
+        self,
+    ) -> Annotated[
+        At | None,
+        Quantity(
+            "gain margin, upwards",
+            "dB",
+            key="gain_margin_db",
+            help="increase of the loop gain up to which the loop stays stable; null unless it is stable",
+        ),
+    ]:
         """The gain margin [dB] upwards at its phase crossover."""
         return None if self.margins is None else At(*gain_margin(self.margins, self.margins.gain[1]))
 
     @property
-    def magnitude(self) -> Annotated[Real, Quantity("|L|", "dB", curve=True, key="magnitude_db",
-            help="size of the loop function")]:  # fmt: skip
+    def magnitude(
+        self,
+    ) -> Annotated[
+        Real, Quantity("|L|", "dB", curve=True, key="magnitude_db", help="size of the loop function")
+    ]:
         """|L| [dB]."""
         return decibels(self.L)
 
     @property
-    def phase(self) -> Annotated[Real, Quantity("phase", "deg", curve=True, help="angle of L, above -360 to 0")]:
+    def phase(
+        self,
+    ) -> Annotated[Real, Quantity("phase", "deg", curve=True, help="angle of L, above -360 to 0")]:
         """The angle of L in (-360, 0] deg: with -180 in the middle, as a Nichols chart has it."""
         return np.asarray(-np.mod(-np.degrees(np.angle(self.L)), 360.0))
 
     @property
-    def sensitivity(self) -> Annotated[Real, Quantity("|S|", "dB", curve=True, key="sensitivity_db",
-            help="size of S = 1/(1 + L)")]:  # fmt: skip
+    def sensitivity(
+        self,
+    ) -> Annotated[
+        Real, Quantity("|S|", "dB", curve=True, key="sensitivity_db", help="size of S = 1/(1 + L)")
+    ]:
         """|S| [dB]."""
         return -decibels(1 + self.L)
 
     @property
-    def complementary(self) -> Annotated[Real, Quantity("|T|", "dB", curve=True, key="complementary_db",
-            help="size of T = L/(1 + L)")]:  # fmt: skip
+    def complementary(
+        self,
+    ) -> Annotated[
+        Real, Quantity("|T|", "dB", curve=True, key="complementary_db", help="size of T = L/(1 + L)")
+    ]:
         """|T| [dB]."""
         return self.magnitude + self.sensitivity
 
@@ -174,7 +198,9 @@ class LoopVerdict(ABC):
         """The loop function on a grid that resolves it."""
         loop = self.full
         omega = self.frequencies
-        omega, L = refine_frequencies(loop.loop_function, omega[omega >= lowest_drawn(loop.arm, self.in_band)])
+        omega, L = refine_frequencies(
+            loop.loop_function, omega[omega >= lowest_drawn(loop.arm, self.in_band)]
+        )
         return LoopCurve(
             arm=loop.arm,
             law=loop.law,
@@ -214,7 +240,9 @@ class LoopAnalysis(ABC):
 def next_limits(factors: Iterable[float]) -> tuple[float, float]:
     """Return the factors next to 1 on both sides, 0 and infinity where there are none."""
     factors = list(factors)
-    return max((t for t in factors if 0 <= t < 1), default=0.0), min((t for t in factors if t > 1), default=math.inf)
+    return max((t for t in factors if 0 <= t < 1), default=0.0), min(
+        (t for t in factors if t > 1), default=math.inf
+    )
 
 
 def refine_frequencies(L: Callable[[Complex], Complex], omega: Real, rounds: int = 6) -> tuple[Real, Complex]:
@@ -228,7 +256,8 @@ def refine_frequencies(L: Callable[[Complex], Complex], omega: Real, rounds: int
         steps = abs(np.diff(np.log(np.where(sizes == 0, 1.0, sizes))))
         (coarse,) = np.nonzero((steps[0] > 0.15) | (steps[1] > 0.4))
         if number < rounds - 1:
-            omega = np.union1d(omega, np.sqrt(omega[coarse] * omega[coarse + 1]))  # each once, by rounding too
+            # each once, by rounding too
+            omega = np.union1d(omega, np.sqrt(omega[coarse] * omega[coarse + 1]))
     return omega, values
 
 
@@ -245,7 +274,8 @@ def decibels(values: Complex | Real | float) -> Real:
 
 def gain_margin(band: LoopMargins, factor: float) -> tuple[float, float | None]:
     """Size [dB] of a factor that ends stability, and the frequency [rad/s] at which it does."""
-    if not 1e-9 < factor < 1e9:  # a larger margin is none
+    # a larger margin is none
+    if not 1e-9 < factor < 1e9:
         return math.inf, None
     near = [w for w, t in band.phase_crossovers if abs(t / factor - 1) < 1e-6]
     return abs(20 * math.log10(factor)), near[0] if near else None

@@ -32,15 +32,15 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes_below
 from tfarm.spectrum.table import first_frequency
 
-LONGEST_DELAY_SAMPLES = 20.0  # samples: end of the search of a delay margin
-MOST_STEPS = 2000  # of a scan of the delay
-MOST_LOOP_MODES = 128  # of a whole loop: half a second of work
-MOST_EDGE_MODES = 64  # of loops in which edges are searched
+# samples: end of the search of a delay margin
+LONGEST_DELAY_SAMPLES = 20.0
+# of loops in which edges are searched
+MOST_EDGE_MODES = 64
 # that are printed where all are certified
-GAIN_DIGITS = 6
 OTHER_DIGITS = 4
 
-Proof = tuple[bool | None, float]  # whether a loop is stable (None: not shown), and the band [rad/s] of that proof
+# whether a loop is stable (None: not shown), and the band [rad/s] of that proof
+Proof = tuple[bool | None, float]
 Test = Callable[[float], Proof]
 Edge = TypeVar("Edge")
 
@@ -58,6 +58,8 @@ def delay_margin(loop: Sampled) -> DelayMargin:
 
     The step of the scan resolves the fastest mode that may become unstable; the margin is then solved for to 1e-10.
     """
+    # of a scan of the delay
+    most_steps = 2000
     now = loop.chain.sampling.delay_samples
 
     def log_radius(more: float) -> float:
@@ -69,12 +71,14 @@ def delay_margin(loop: Sampled) -> DelayMargin:
     T = loop.chain.sampling.period
     # 4 times the first-order shift of a pole by the feedback: a mode with more damping stays stable
     reach = 4 * loop.push * abs(held_amplitude(plant.poles, T))
-    risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)  # the feedback may exceed their own damping
+    # the feedback may exceed their own damping
+    risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)
     fastest = (plant.poles.imag[risky] * T).max(initial=np.pi / 4)
     # 0.1 samples: 18 degrees of a pole at z = -1
     # 12 steps a turn of the fastest mode that may be unstable
-    step = float(min(0.1, 2 * np.pi / fastest / 12))  # samples
-    scanned = step * np.arange(min(MOST_STEPS, int(LONGEST_DELAY_SAMPLES / step)) + 1)
+    # samples
+    step = float(min(0.1, 2 * np.pi / fastest / 12))
+    scanned = step * np.arange(min(most_steps, int(LONGEST_DELAY_SAMPLES / step)) + 1)
     for low, high in pairwise(scanned.tolist()):
         later = loop.with_delay(now + high)
         # 1e-6 within the circle: an eigenvalue there is not polished, as even a double one has an error of 1e-7
@@ -82,7 +86,7 @@ def delay_margin(loop: Sampled) -> DelayMargin:
             is_between = log_radius(low) < 0
             # a delay margin is known to 1e-10 samples
             return DelayMargin(float(brentq(log_radius, low, high, xtol=1e-10)) if is_between else low, False)
-    return DelayMargin(min(MOST_STEPS * step, LONGEST_DELAY_SAMPLES), True)
+    return DelayMargin(min(most_steps * step, LONGEST_DELAY_SAMPLES), True)
 
 
 def required_damping(case: Case, *, count: int = 40) -> float:
@@ -142,8 +146,10 @@ def count_lasting_modes(arm: Arm, chain: Chain) -> int:
 
 def most_modes(arm: Arm, chain: Chain) -> int:
     """Largest number of modes of a loop: of a damped arm those that outlive a sample, and a few; at most 128."""
+    # of a whole loop: half a second of work
+    most_loop_modes = 128
     # 4 modes of a whole loop decay within a sample
-    return min(MOST_LOOP_MODES, 4 + count_lasting_modes(arm, chain)) if arm.least_damping else MOST_LOOP_MODES
+    return min(most_loop_modes, 4 + count_lasting_modes(arm, chain)) if arm.least_damping else most_loop_modes
 
 
 def whole_loop(case: Case) -> Sampled:
@@ -162,15 +168,29 @@ class Figure:
     """
 
     value: Annotated[float, Quantity("value", help="value of the limit")]
-    digits: Annotated[int, Quantity("digits",
-            help="significant digits, certified or confirmed by another number of modes")]  # fmt: skip
-    band: Annotated[float | None, Quantity("certified up to", "rad/s", key="up_to_rad_s",
-            help="end of the frequency range in which every mode is taken into account")]  # fmt: skip
-    modes: Annotated[int | None, Quantity("holds for the first modes",
-            help="number of modes of the model where the limit is converged and not certified")]  # fmt: skip
+    digits: Annotated[
+        int, Quantity("digits", help="significant digits, certified or confirmed by another number of modes")
+    ]
+    band: Annotated[
+        float | None,
+        Quantity(
+            "certified up to",
+            "rad/s",
+            key="up_to_rad_s",
+            help="end of the frequency range in which every mode is taken into account",
+        ),
+    ]
+    modes: Annotated[
+        int | None,
+        Quantity(
+            "holds for the first modes",
+            help="number of modes of the model where the limit is converged and not certified",
+        ),
+    ]
     is_bound: bool = False
 
-    is_sharp = True  # as a limit: its digits need no test
+    # as a limit: its digits need no test
+    is_sharp = True
 
     @property
     def figure(self) -> Figure:
@@ -178,14 +198,25 @@ class Figure:
         return self
 
     @property
-    def is_settled(self) -> Annotated[bool, Quantity("certified", key="certified",
-            help="whether the limit is certified for every mode up to a frequency")]:  # fmt: skip
+    def is_settled(
+        self,
+    ) -> Annotated[
+        bool,
+        Quantity(
+            "certified",
+            key="certified",
+            help="whether the limit is certified for every mode up to a frequency",
+        ),
+    ]:
         """Whether it is certified in a band."""
         return self.band is not None
 
     @property
-    def text(self) -> Annotated[str, Quantity("in these digits",
-            help="the value in its significant digits, ? where there are none")]:  # fmt: skip
+    def text(
+        self,
+    ) -> Annotated[
+        str, Quantity("in these digits", help="the value in its significant digits, ? where there are none")
+    ]:
         """The number in these digits; "?" where there are none."""
         if self.value == 0.0 or math.isinf(self.value):
             return f"{self.value:g}"
@@ -205,7 +236,8 @@ class LowerBound(float):
         return f"≥ {general(self, digits)}"
 
 
-FigurePair = tuple[Figure, Figure]  # both edges of a stable interval
+# both edges of a stable interval
+FigurePair = tuple[Figure, Figure]
 
 
 @dataclass(frozen=True)
@@ -264,6 +296,8 @@ class Limit:
 
 def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[FigurePair]:
     """Return the stability intervals of a number, with more and more modes until all digits are certified."""
+    # that are printed where all are certified
+    gain_digits = 6
 
     def proof(value: float) -> Proof:
         return _proof(band, loop.having(name, value))
@@ -278,14 +312,19 @@ def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[FigurePai
         def edge(value: float, opposite: float, *, below: bool) -> Limit:
             # 1e-6 of the other edge of an interval: distance from 0 at which an edge at 0 is tested
             spare = 1e-6 * (abs(opposite) if opposite and math.isfinite(opposite) else 1.0)
-            return Limit(value, GAIN_DIGITS, modes, proof, confirmed, below=below, spare=spare)
+            return Limit(value, gain_digits, modes, proof, confirmed, below=below, spare=spare)
 
-        return [(edge(low, high, below=False), edge(high, low, below=True)) for low, high in stable_windows(loop, name)]
+        return [
+            (edge(low, high, below=False), edge(high, low, below=True))
+            for low, high in stable_windows(loop, name)
+        ]
 
     def is_sharp(windows: list[tuple[Limit, Limit]]) -> bool:
         return all(edge.is_sharp for pair in windows for edge in pair)
 
-    return [(low.figure, high.figure) for low, high in _most_certain(loop, band, MOST_EDGE_MODES, found, is_sharp)]
+    return [
+        (low.figure, high.figure) for low, high in _most_certain(loop, band, MOST_EDGE_MODES, found, is_sharp)
+    ]
 
 
 def _most_certain(

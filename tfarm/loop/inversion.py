@@ -16,12 +16,13 @@ from scipy.ndimage import maximum_filter1d
 from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.records import frozen
 
-POINTS = 2**15  # of the sum
+# of the sum
+POINTS = 2**15
 # P is four times the times that are wanted; e^-36 of what follows is added
-PERIODS = 4.0
-ALIASED = 36.0
-FINER = 4  # times the points of the sum: even times, 4 in a period of its last frequency, 8 of the largest not faded
-NEAR = 32  # of these times to either side, whose largest error is taken: the difference of two sums has zeros
+# times the points of the sum: even times, 4 in a period of its last frequency, 8 of the largest not faded
+FINER = 4
+# of these times to either side, whose largest error is taken: the difference of two sums has zeros
+NEAR = 32
 
 
 @frozen
@@ -44,8 +45,11 @@ class Inversion:
 
 def invert_transform(transform: Callable[[Complex], Complex], end: float, growth: float = 0.0) -> Inversion:
     """Return the inverse of a transform, (signals, n) at s (n,), from 0 to `end` [s]; poles have Re s <= `growth`."""
-    period = PERIODS * end
-    shift = growth + ALIASED / period
+    # P is four times the times that are wanted; e^-36 of what follows is added
+    periods = 4.0
+    aliased = 36.0
+    period = periods * end
+    shift = growth + aliased / period
     n = np.arange(POINTS)
     values = transform(shift + 2j * np.pi * n / period)
     values[:, 0] /= 2
@@ -63,5 +67,5 @@ def invert_transform(transform: Callable[[Complex], Complex], end: float, growth
     error = np.maximum(abs(y - shorter), abs(np.roll(y[:, ::-1], 1, axis=1)))
     error = maximum_filter1d(error, 2 * NEAR + 1, axis=1, mode="wrap")
     error += MACHINE_EPS * rising * abs(values).sum(axis=1, keepdims=True)
-    wanted = slice(k.size // int(PERIODS) + 1)
+    wanted = slice(k.size // int(periods) + 1)
     return Inversion(t[wanted], error[:, wanted], CubicSpline(t[wanted], y[:, wanted], axis=1))

@@ -31,9 +31,10 @@ from tfarm.response.signals import Signals
 from tfarm.spectrum.box import FIRST_POINTS, NEAREST_TO_ZERO, TRIED_HEIGHTS, argument_change
 from tfarm.spectrum.table import first_frequency
 
-LEADING = ".den.0"  # how the name of a leading coefficient ends
-ORDER_READ_AT = (2e-3, 1e-3)  # of w1: where the order of a zero at s = 0 is read off
-NEAR_ORIGIN = (1e-6, 5e-7)  # of the lowest frequency: where a real pole is searched on its way through 0
+# how the name of a leading coefficient ends
+LEADING = ".den.0"
+# of the lowest frequency: where a real pole is searched on its way through 0
+NEAR_ORIGIN = (1e-6, 5e-7)
 
 
 def with_numbers(law: Law, values: Mapping[str, float]) -> Law:
@@ -66,7 +67,8 @@ class LawTerms:
         for name in names:
             if self.part(name) is None and name != "gain":
                 value = law.numbers.get(name, 0.0)
-                small = value * 2.0**-30 or 1.0  # not 0, as a leading 0 moves the other coefficients
+                # not 0, as a leading 0 moves the other coefficients
+                small = value * 2.0**-30 or 1.0
                 part = [each.signals for each in law.parts].index((name.rsplit(".", 2)[0],))
                 self.others[name] = value, small, part, self.law.having(name, small).parts[part].block
 
@@ -103,7 +105,8 @@ class LawTerms:
         """The line of a number of the law."""
         weights = np.r_[self.weights, np.zeros(len(self.others))]
         part = self.part(name)
-        if name == "gain":  # a factor on the law
+        # a factor on the law
+        if name == "gain":
             return Line.of(weights, np.r_[0.0, weights[1:]], 1.0, low, high)
         if part is not None:
             return Line.of(weights, np.eye(weights.size)[1 + part], weights[1 + part], low, high)
@@ -134,15 +137,22 @@ class Along(NamedTuple):
     line: Line
 
 
-def cross_axis(arm: Arm, terms: LawTerms, band: float, loops: Sequence[Along]) -> Iterator[Callable[[], Crossings]]:
+def cross_axis(
+    arm: Arm, terms: LawTerms, band: float, loops: Sequence[Along]
+) -> Iterator[Callable[[], Crossings]]:
     """Return for each line what makes its crossings of the axis, between its limits.
 
     It raises ConvergenceError where poles meet at s = 0 that cannot be counted.
     """
-    with_dips = bool(arm.least_damping)  # else h is rounding where modes rest
+    # of w1: where the order of a zero at s = 0 is read off
+    order_read_at = (2e-3, 1e-3)
+    # else h is rounding where modes rest
+    with_dips = bool(arm.least_damping)
     curve = Grid(np.asarray(grid(arm, band)), terms.on_axis)
     found = crossings(curve, [each.line for each in loops], with_dips=with_dips)
-    s = np.r_[curve.places[0] * np.array(NEAR_ORIGIN), first_frequency(arm) * np.array([*ORDER_READ_AT, *FAR_RIGHT])]
+    s = np.r_[
+        curve.places[0] * np.array(NEAR_ORIGIN), first_frequency(arm) * np.array([*order_read_at, *FAR_RIGHT])
+    ]
     rows = terms.at(s + 0j)
     for along, pairs in zip(loops, found, strict=True):
         line = along.line
@@ -217,7 +227,8 @@ def through_origin(N: Complex, P: Complex, limits: Window) -> Crossing | None:
 
 def through_infinity(N: Complex, P: Complex) -> int:
     """The change of the count by a real pole through infinity, from N and P at three places as `FAR_RIGHT`; 0: none."""
-    with np.errstate(all="ignore"):  # a law of high order is beyond any number there
+    # a law of high order is beyond any number there
+    with np.errstate(all="ignore"):
         before, last = np.diff(-(N / P).real)
         # by more than 0.75 of the step before, of places ever farther right, a gain without a limit grows
         has_limit = abs(last) < 0.75 * abs(before)
@@ -231,7 +242,9 @@ def unstable_below(loop: ContinuousLoop, band: float) -> int:
     axis, to working precision.
     """
     if loop.resting_zeros:
-        raise ConvergenceError("a pole is at s = 0, neither stable nor unstable: take other values", loop, 0.0)
+        raise ConvergenceError(
+            "a pole is at s = 0, neither stable nor unstable: take other values", loop, 0.0
+        )
     right = box_of(loop, band).re_max
     nearest = MARGIN_OF_ZERO if loop.arm.least_damping else NEAREST_TO_ZERO
     for factor in TRIED_HEIGHTS:

@@ -30,13 +30,16 @@ if TYPE_CHECKING:
 
 # values of the gain, and branches
 LOCUS_POINTS = 300
-LOCUS_BRANCHES = 7
-POLE_DIGITS = 10  # digits of |s| that are drawn and written: poles differ from processor to processor by 1e-14 at most
+# digits of |s| that are drawn and written: poles differ from processor to processor by 1e-14 at most
+POLE_DIGITS = 10
 GAP_NOTE = (
-    "largest distance of a branch from the reduced one, over |s| or the arm's first flexible frequency, the larger"
+    "largest distance of a branch from the reduced one, "
+    "over |s| or the arm's first flexible frequency, the larger"
 )
 BEST = Quantity(
-    "first mode most damped", key="first_mode_most_damped", help="largest damping ratio of mode 1 along a gain"
+    "first mode most damped",
+    key="first_mode_most_damped",
+    help="largest damping ratio of mode 1 along a gain",
 )
 BRANCHES_NOTE = (
     "poles followed: those at s = 0, then one a mode with Im s > 0; its mirror image only where the two part on the "
@@ -61,7 +64,9 @@ class ReducedLocus:
     gap: Real
 
     @property
-    def worst(self) -> Annotated[float, Quantity("largest gap to it", digits=2, help=GAP_NOTE, key="gap_to_reduced")]:
+    def worst(
+        self,
+    ) -> Annotated[float, Quantity("largest gap to it", digits=2, help=GAP_NOTE, key="gap_to_reduced")]:
         """The largest gap of all branches."""
         return float(self.gap.max())
 
@@ -83,7 +88,8 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
         system = open_loop(exact.case, exact.vary, count)
         try:
             poles = np.asarray(control.root_locus_map(system, exact.gain).loci)
-        except np.linalg.LinAlgError as error:  # it works with coefficients of s^n, which overflow at high frequencies
+        except np.linalg.LinAlgError as error:
+            # it works with coefficients of s^n, which overflow at high frequencies
             text = f"python-control cannot follow a model of this arm: {error}"
             raise ConvergenceError(text, arm.name, count) from None
     else:
@@ -99,7 +105,9 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
         _, chosen = linear_sum_assignment(np.nan_to_num(abs(zeros[:, None] - found)))
         paired[:, n] = np.where(np.isnan(zeros), np.nan, found[chosen])
     size = np.maximum(abs(branches), modes(arm, 1).natural_frequency[-1])
-    return ReducedLocus(order, exact.gain[which], paired, np.fmax.reduce(abs(paired - branches) / size, axis=1))
+    return ReducedLocus(
+        order, exact.gain[which], paired, np.fmax.reduce(abs(paired - branches) / size, axis=1)
+    )
 
 
 def reduced_of(exact: Locus) -> ReducedLocus | None:
@@ -123,7 +131,8 @@ def _closed(arm: Arm, fixed: Real, count: int, moving: Real) -> tuple[Matrices, 
     """The model of the outputs of either row of gains, closed by the fixed one; the other row on its outputs."""
     used = (fixed != 0) | (moving != 0)
     used[FED_BACK.index("hub_rate")] |= not used.any()
-    used[FED_BACK.index("hub_angle")] |= bool(arm.rate_loss) and arm.has_rigid_mode  # or its pole at 0 is not a state
+    # or its pole at 0 is not a state
+    used[FED_BACK.index("hub_angle")] |= bool(arm.rate_loss) and arm.has_rigid_mode
     model = modal_model(arm, [name for name, is_used in zip(FED_BACK, used, strict=True) if is_used], count)
     return model.closed(fixed[used]), moving[None, used]
 
@@ -163,7 +172,9 @@ def most_damped(found: Locus) -> MostDamped | None:
 
         def ratio(value: float) -> float:
             return -float(
-                damping_ratios(interpolate_roots(found.varied, gain, branch[:, None], np.array([value])))[0, 0]
+                damping_ratios(interpolate_roots(found.varied, gain, branch[:, None], np.array([value])))[
+                    0, 0
+                ]
             )
 
         # 1e-7 of the gain: a damping ratio, flat there, is known to 1e-14 of its curvature
@@ -182,13 +193,21 @@ def damping_ratios(s: Complex) -> Real:
 class Branch(NamedTuple):
     """A branch of a locus: its poles at both ends of the range, and its distance from the reduced model's."""
 
-    branch: Annotated[int, Quantity("branch", help="its number among the poles of the CSV file and the picture")]
+    branch: Annotated[
+        int, Quantity("branch", help="its number among the poles of the CSV file and the picture")
+    ]
     origin: Annotated[str, ORIGIN]
     mode: Annotated[int, Quantity(help="flexible mode that the branch continues from; 0 of another origin")]
-    first: Annotated[complex, Quantity("first pole", "1/s", 10, "pole at the first value of the number that varies")]
-    last: Annotated[complex, Quantity("last pole", "1/s", 10, "pole at the last value of the number that varies")]
+    first: Annotated[
+        complex, Quantity("first pole", "1/s", 10, "pole at the first value of the number that varies")
+    ]
+    last: Annotated[
+        complex, Quantity("last pole", "1/s", 10, "pole at the last value of the number that varies")
+    ]
     gap: Annotated[float | None, Quantity("gap to reduced", digits=2, help=GAP_NOTE)]
-    ends_at: Annotated[float | None, Quantity("followed up to", digits=10, help="last value at which it is followed")]
+    ends_at: Annotated[
+        float | None, Quantity("followed up to", digits=10, help="last value at which it is followed")
+    ]
     titles: dict[str, Title]
 
 
@@ -197,7 +216,8 @@ class Loci:
     """The exact locus and the reduced one."""
 
     exact: Annotated[Locus, Quantity(flat=True)]
-    reduced: Annotated[ReducedLocus | Any, Quantity(flat=True)]  # None of a law that is more than gains at the hub
+    # None of a law that is more than gains at the hub
+    reduced: Annotated[ReducedLocus | Any, Quantity(flat=True)]
 
     @property
     def rows(self) -> Annotated[list[Branch], Quantity("branches", key="branch_list", help=BRANCHES_NOTE)]:
@@ -210,10 +230,13 @@ class Loci:
         gaps = [None] * len(branches) if self.reduced is None else self.reduced.gap.tolist()
         values = zip(("first", "last"), exact.gain[[0, -1]].tolist(), strict=True)
         titles = {
-            end: (f"pole at {exact.vary} = {value:.6g}{f' {unit}' if unit else ''}", "1/s") for end, value in values
+            end: (f"pole at {exact.vary} = {value:.6g}{f' {unit}' if unit else ''}", "1/s")
+            for end, value in values
         }
         return [
-            Branch(n, origin_name(int(exact.origin[n])), modes[n], row[0], row[-1], gaps[n], ends.get(n), titles)
+            Branch(
+                n, origin_name(int(exact.origin[n])), modes[n], row[0], row[-1], gaps[n], ends.get(n), titles
+            )
             for n, row in enumerate(branches)
         ]
 
@@ -242,5 +265,6 @@ def held_branches(branches: Complex) -> Complex:
 
 def loci(case: Case, vary: str, start: float, stop: float) -> Loci:
     """Return both loci of one gain.  Raises what `locus` and `reduced_locus` raise."""
-    exact = locus(case.arm, case.law, vary, start, stop, LOCUS_POINTS, LOCUS_BRANCHES)
+    locus_branches = 7
+    exact = locus(case.arm, case.law, vary, start, stop, LOCUS_POINTS, locus_branches)
     return Loci(exact, reduced_locus(exact))

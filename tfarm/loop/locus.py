@@ -40,16 +40,19 @@ from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.following import assign_roots, follow, interpolate_roots
 
-MOST_LOCUS_POINTS = 100_000  # values, those between that make it round among them
-MOST_BRANCHES = 200  # and flexible modes below the top of the box
-CROSSINGS_SHOWN = 3  # of a locus, in its finding
+# values, those between that make it round among them
+MOST_LOCUS_POINTS = 100_000
+# of a locus, in its finding
+CROSSINGS_SHOWN = 3
 # origin of a branch of no flexible mode
 RIGID = 0
 CONTROLLER = -1
 OTHER = -2
 ORIGINS = {RIGID: "rigid body", CONTROLLER: "controller", OTHER: "other"}
 
-CROSSINGS = Quantity("crossings of the imaginary axis", help="solved for, not interpolated; in the order of the range")
+CROSSINGS = Quantity(
+    "crossings of the imaginary axis", help="solved for, not interpolated; in the order of the range"
+)
 ORIGIN = Quantity(
     "origin",
     help="open-loop pole that the branch continues from; other: the motor's circuit, a delay, a fast real pole",
@@ -77,11 +80,17 @@ class Locus(OfCase):
     """
 
     case: Case
-    vary: Annotated[str, Quantity("varied", help="number of the controller or the arm along which poles are followed")]
+    vary: Annotated[
+        str, Quantity("varied", help="number of the controller or the arm along which poles are followed")
+    ]
     gain: Annotated[Real, Quantity("value", curve=True, help="values of the number that varies")]
-    branches: Annotated[Complex, Quantity("branch", "1/s", curve=True, help="closed-loop poles, a branch each")]
+    branches: Annotated[
+        Complex, Quantity("branch", "1/s", curve=True, help="closed-loop poles, a branch each")
+    ]
     origin: Whole
-    box: Annotated[Box, Quantity("box: Re s from, to, Im s from, to", help="poles are complete in it at a few values")]
+    box: Annotated[
+        Box, Quantity("box: Re s from, to, Im s from, to", help="poles are complete in it at a few values")
+    ]
     crossings: Annotated[tuple[BranchCrossing, ...], CROSSINGS]
     followed: Complex = field(repr=False, compare=False)
     listed: Whole = field(repr=False, compare=False)
@@ -143,7 +152,9 @@ class Locus(OfCase):
         """The number of each branch that ends within the range, and the last value at which it is followed."""
         lives = ~np.isnan(self.branches)
         rows = np.nonzero(~lives[:, -1])[0]
-        return tuple((int(row), float(self.gain[np.nonzero(lives[row])[0][-1]])) for row in rows if lives[row].any())
+        return tuple(
+            (int(row), float(self.gain[np.nonzero(lives[row])[0][-1]])) for row in rows if lives[row].any()
+        )
 
 
 def locus(
@@ -157,6 +168,8 @@ def locus(
     modes, by default at 100 values.  Else it has that many branches, by default at 500 values.
     Raises ParameterError for an invalid law, loop or range, ConvergenceError where branches cannot be distinguished.
     """
+    # and flexible modes below the top of the box
+    most_branches = 200
     case = Case(arm, law)
     gains = case.gains
     require(isinstance(vary, str), "vary", vary, f"the name of what varies, such as {PLANE[1]} or length")
@@ -169,28 +182,34 @@ def locus(
     # by default 500 values of gains, 100 of any other law
     points = (100 if in_box else 500) if points is None else points
     points = whole("points", points, 2, MOST_LOCUS_POINTS, f"a whole number from 2 to {MOST_LOCUS_POINTS}")
-    branches = whole("branches", branches, 1, MOST_BRANCHES, f"a whole number from 1 to {MOST_BRANCHES}")
+    branches = whole("branches", branches, 1, most_branches, f"a whole number from 1 to {most_branches}")
     number = branches if in_box else max(1, branches - 2 * case.arm.has_rigid_mode)
     family = Varied(case, vary, start, stop).with_box(number)
     gain = np.linspace(start, stop, points)
     rows, origin = follow_poles(family, gain, number)
     is_shown = family.box.holds(rows) if in_box else ~np.isnan(rows)
-    is_upper = (rows.imag >= 0).any(axis=1)  # others are mirror images throughout
+    # others are mirror images throughout
+    is_upper = (rows.imag >= 0).any(axis=1)
     listed = np.flatnonzero(is_shown.any(axis=1) & is_upper)[: None if in_box else branches - family.pinned]
     pinned = min(family.pinned, branches)
     found = branches_in_box(rows, listed, pinned, family.box if in_box else None)
     if len(found) < branches and not in_box:
-        raise ConvergenceError(f"only {len(found)} branches could be followed: ask for fewer", found, branches)
+        raise ConvergenceError(
+            f"only {len(found)} branches could be followed: ask for fewer", found, branches
+        )
     origin = np.r_[at_origin(family.first)[:pinned], origin[listed]]
     top = family.box.im_max if in_box else float(np.fmax.reduce(found.imag).min()) or family.frequency
     crossings = branch_crossings(family, gain, found, origin, top)
-    return Locus(case.on(family.first.arm), vary, gain, found, origin, family.box, crossings, rows, listed, in_box)
+    return Locus(
+        case.on(family.first.arm), vary, gain, found, origin, family.box, crossings, rows, listed, in_box
+    )
 
 
 def branches_in_box(rows: Complex, listed: Whole, pinned: int, box: Box | None) -> Complex:
     """The branches listed after the poles pinned at 0, NaN outside the box where there is one."""
     found: Complex = np.concatenate([np.zeros((pinned, rows.shape[1]), complex), rows[listed]])
-    found += 0.0  # no -0
+    # no -0
+    found += 0.0
     return found if box is None else np.where(box.holds(found), found, np.nan)
 
 
@@ -207,7 +226,8 @@ def follow_poles(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole
         high = nodes[0]
         try:
             part = follow(family, gain[low : high + 1], rows[:, -1])
-        except ConvergenceError:  # of a pole that came into the box, and is next to one of these
+        except ConvergenceError:
+            # of a pole that came into the box, and is next to one of these
             if high - low == 1:
                 raise
             nodes.insert(0, (low + high) // 2)
@@ -227,7 +247,8 @@ def missing_poles(family: Varied, value: float, row: Complex) -> Complex:
     inside = row[family.box.holds(row) & (row != 0)]
     try:
         count = family.count(value)
-    except ConvergenceError:  # a pole on the edge of the box: there it comes or goes
+    except ConvergenceError:
+        # a pole on the edge of the box: there it comes or goes
         return row[:0]
     if count < inside.size:
         text = f"two branches cannot be distinguished at {family.vary} = {value:.10g}"
@@ -255,9 +276,11 @@ def continue_from_rig(family: Varied, number: int) -> tuple[Complex, Whole]:
     if loop.feeds_back:
         try:
             row = follow(grown, np.array([0.0, 1.0]), row)[1]
-        except ConvergenceError:  # of poles that come in from afar, as under a delay
+        except ConvergenceError:
+            # of poles that come in from afar, as under a delay
             row = assign_roots(grown, 1.0, row)
-    of_first = resting[family.pinned : grown.pinned]  # at 0 at the first value alone
+    # at 0 at the first value alone
+    of_first = resting[family.pinned : grown.pinned]
     row = np.r_[np.zeros(of_first.size, complex), row]
     origin = np.r_[of_first, origin]
     return row[~np.isnan(row)], origin[~np.isnan(row)]
@@ -319,8 +342,10 @@ def frame(branches: Complex) -> tuple[float, float, float, float]:
     low = float(points.imag.min())
     high = float(points.imag.max())
     # less than 1e-12 of the size of its poles is rounding of a constant pole
-    wide = max(right - left, 1e-12 * float(abs(points).max())) or 1.0  # where no pole moves from 0
-    tall = max(high - low, 1e-9 * high) or wide  # where none of them oscillates
+    # where no pole moves from 0
+    wide = max(right - left, 1e-12 * float(abs(points).max())) or 1.0
+    # where none of them oscillates
+    tall = max(high - low, 1e-9 * high) or wide
     return left, left + wide, low, low + tall
 
 
@@ -343,10 +368,16 @@ class BranchCrossing:
     becomes positive as the locus runs, and "stable" where it becomes negative.  `title` is that of the varied number.
     """
 
-    gain: Annotated[float, Quantity("value", digits=10, help="value of the number that varies, at the crossing")]
-    omega: Annotated[float, Quantity("frequency", "rad/s", 10, "imaginary part there; 0 or infinite of a real pole")]
+    gain: Annotated[
+        float, Quantity("value", digits=10, help="value of the number that varies, at the crossing")
+    ]
+    omega: Annotated[
+        float, Quantity("frequency", "rad/s", 10, "imaginary part there; 0 or infinite of a real pole")
+    ]
     branch: Annotated[int | None, Quantity("branch", help="- : a pole on no branch")]
-    direction: Annotated[str, Quantity("becomes", help="side of the axis to which the pole goes as the locus runs")]
+    direction: Annotated[
+        str, Quantity("becomes", help="side of the axis to which the pole goes as the locus runs")
+    ]
     origin: Annotated[str | None, ORIGIN] = None
     title: Title = ("value", "")
 
@@ -381,13 +412,16 @@ def branch_crossings(
         band = max(top, 1.01 * float(np.nanmax(branches.imag, initial=0.0)))
         try:
             known = list(without_losses(loop, name, line_crossings(loop, name, low, high, band)))
-        except ConvergenceError:  # two poles meet at s = 0, and those of modes that rest are on the axis throughout
+        except ConvergenceError:
+            # two poles meet at s = 0, and those of modes that rest are on the axis throughout
             if is_damped:
                 raise
 
     def crossing(at: float, omega: float, change: float, branch: int | None = None) -> BranchCrossing:
         of = None if branch is None else origin_name(int(origin[branch]))
-        return BranchCrossing(at, omega, branch, "unstable" if way * change > 0 else "stable", of, family.title)
+        return BranchCrossing(
+            at, omega, branch, "unstable" if way * change > 0 else "stable", of, family.title
+        )
 
     found = []
     for number, *step in changes:
@@ -423,11 +457,17 @@ def _changes(branches: Complex) -> list[tuple[int, int, int]]:
         pairs = {(a, b) for a, b in pairwise(np.flatnonzero(sides).tolist()) if sides[a] != sides[b]}
         pairs |= {(n, n + 1) for n in np.flatnonzero(leaves[number]).tolist()}
         is_upper = poles.imag >= 0
-        found += [(number, a, b) for a, b in sorted(pairs) if is_upper[[a, b]].all() and np.isfinite(poles[a:b]).all()]
+        found += [
+            (number, a, b)
+            for a, b in sorted(pairs)
+            if is_upper[[a, b]].all() and np.isfinite(poles[a:b]).all()
+        ]
     return found
 
 
-def _crossed(family: Varied, ends: Real, points: Complex, known: Sequence[Crossing], top: float) -> tuple[float, float]:
+def _crossed(
+    family: Varied, ends: Real, points: Complex, known: Sequence[Crossing], top: float
+) -> tuple[float, float]:
     """The value between two (ascending) at which a branch is on the axis, and the frequency there."""
     (low, high) = ends.tolist()
     (slow, fast) = sorted(abs(points.imag).tolist())

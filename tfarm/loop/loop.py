@@ -41,14 +41,18 @@ class Loop(ABC):
         return None
 
     @property
-    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
+    def controller(
+        self,
+    ) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return controller(self.law, self.arm)
 
     @cached_property
     def warnings(
         self,
-    ) -> Annotated[tuple[str, ...], Quantity("warnings", help="unstable controller poles that its zeros cancel")]:
+    ) -> Annotated[
+        tuple[str, ...], Quantity("warnings", help="unstable controller poles that its zeros cancel")
+    ]:
         """Unstable poles of the law that its own zeros cancel."""
         return warn_of_cancellations(self.law)
 

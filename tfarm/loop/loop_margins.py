@@ -21,8 +21,8 @@ from tfarm.loop.loop import Loop
 from tfarm.records import frozen
 from tfarm.schema import At, Quantity
 
-CROSSOVER_DIGITS = 12  # of the value at each crossover, at most: more than any table rounds to
-AT_POLE = 1e-9  # a factor on L so small belongs to a pole of L on the axis, where L changes its sign through infinity
+# of the value at each crossover, at most: more than any table rounds to
+CROSSOVER_DIGITS = 12
 DELAY_MARGIN = Quantity("delay margin", "s", help="smallest further loop delay that destabilises the loop")
 DISK_MARGIN = Quantity("disk margin", help="gain and phase together: factors (2 + d)/(2 - d), |d| < margin")
 PEAK_SENSITIVITY = Quantity("peak sensitivity Ms", key="peak_sensitivity", help="largest |1/(1 + L)|")
@@ -35,14 +35,20 @@ class GainCrossover(NamedTuple):
     """A frequency with |L| = 1."""
 
     omega: Annotated[float, Quantity("frequency", "rad/s", 7, "gain crossover frequency, |L| = 1")]
-    phase_margin: Annotated[float, Quantity("phase margin", "deg", help="angle from -1 to L; above 0 for lag")]
+    phase_margin: Annotated[
+        float, Quantity("phase margin", "deg", help="angle from -1 to L; above 0 for lag")
+    ]
 
 
 class PhaseCrossover(NamedTuple):
     """A frequency with L < 0."""
 
-    omega: Annotated[float, Quantity("frequency", "rad/s", 7, "phase crossover frequency, L real and negative")]
-    factor: Annotated[float, Quantity("gain margin (factor)", help="-1/L: this factor on L puts a pole there")]
+    omega: Annotated[
+        float, Quantity("frequency", "rad/s", 7, "phase crossover frequency, L real and negative")
+    ]
+    factor: Annotated[
+        float, Quantity("gain margin (factor)", help="-1/L: this factor on L puts a pole there")
+    ]
 
 
 @frozen
@@ -56,8 +62,15 @@ class LoopMargins:
     L < 0 and the factor -1/L on it that puts a pole there, both ascending.
     """
 
-    band: Annotated[float, Quantity("frequency range, up to", "rad/s", key="up_to_rad_s",
-            help="end of the frequency range of these margins")]  # fmt: skip
+    band: Annotated[
+        float,
+        Quantity(
+            "frequency range, up to",
+            "rad/s",
+            key="up_to_rad_s",
+            help="end of the frequency range of these margins",
+        ),
+    ]
     gain: tuple[float, float]
     phase: float
     phase_lag: float
@@ -81,20 +94,42 @@ class LoopMargins:
         return At(value, None if is_anywhere else self.at[name])
 
     @property
-    def phase_margin(self) -> Annotated[At, Quantity("phase margin", "deg",
-            help="of least size where |L| = 1; above 0 for lag, below for lead")]:  # fmt: skip
+    def phase_margin(
+        self,
+    ) -> Annotated[
+        At,
+        Quantity("phase margin", "deg", help="of least size where |L| = 1; above 0 for lag, below for lead"),
+    ]:
         """The phase margin of least size."""
         return self.at_frequency("phase")
 
     @property
-    def lag(self) -> Annotated[At, Quantity("phase margin for lag", "deg", key="phase_lag_deg",
-            help="least phase lag of L that destabilises the loop; inf without a limit")]:  # fmt: skip
+    def lag(
+        self,
+    ) -> Annotated[
+        At,
+        Quantity(
+            "phase margin for lag",
+            "deg",
+            key="phase_lag_deg",
+            help="least phase lag of L that destabilises the loop; inf without a limit",
+        ),
+    ]:
         """The least phase margin for lag."""
         return self.at_frequency("phase_lag")
 
     @property
-    def lead(self) -> Annotated[At, Quantity("phase margin for lead", "deg", key="phase_lead_deg",
-            help="least phase lead of L that destabilises the loop; inf without a limit")]:  # fmt: skip
+    def lead(
+        self,
+    ) -> Annotated[
+        At,
+        Quantity(
+            "phase margin for lead",
+            "deg",
+            key="phase_lead_deg",
+            help="least phase lead of L that destabilises the loop; inf without a limit",
+        ),
+    ]:
         """The least phase margin for lead."""
         return self.at_frequency("phase_lead")
 
@@ -120,16 +155,21 @@ class LoopMargins:
 
 
 def margins_along(
-    loop: Loop, omega: Real, band: float, gain_limits: Callable[[tuple[PhaseCrossover, ...]], tuple[float, float]]
+    loop: Loop,
+    omega: Real,
+    band: float,
+    gain_limits: Callable[[tuple[PhaseCrossover, ...]], tuple[float, float]],
 ) -> LoopMargins:
     """Return the margins of a loop function up to a band, on a grid (n,) that resolves it.
 
     `gain_limits` gives the factors on the law between which the loop is stable, from its phase crossovers.
     """
     crossed = unit_crossings(loop, omega)
-    apart = _spread(lambda w: loop.loop_function(1j * w), crossed)  # of size 1: what its angle moves by [rad]
+    # of size 1: what its angle moves by [rad]
+    apart = _spread(lambda w: loop.loop_function(1j * w), crossed)
     minus = -loop.loop_function(1j * crossed)
-    angle = round_near_poles(np.degrees(np.angle(minus)), np.degrees(apart), CROSSOVER_DIGITS)  # 0 where L = -1
+    # 0 where L = -1
+    angle = round_near_poles(np.degrees(np.angle(minus)), np.degrees(apart), CROSSOVER_DIGITS)
     delay = round_near_poles(np.radians(np.mod(angle, 360)) / crossed, apart / crossed)
     lag = angle > 0
     lead = angle < 0
@@ -189,6 +229,8 @@ def phase_crossovers(loop: Loop, omega: Real) -> tuple[PhaseCrossover, ...]:
     L.  Both sides are compared as near as rounding allows: next to a narrow resonance L is so close to the axis that
     the place itself is not known.
     """
+    # a factor on L so small belongs to a pole of L on the axis, where L changes its sign through infinity
+    at_pole = 1e-9
 
     def turned(w: Real) -> Real:
         drive, fed_back = loop.parts(1j * w)
@@ -197,21 +239,22 @@ def phase_crossovers(loop: Loop, omega: Real) -> tuple[PhaseCrossover, ...]:
     factor, place, _ = locate_crossings(omega, lambda w: loop.parts(1j * w))
     # shares of a frequency on either side, until rounding no longer decides the side of the axis that L is on
     farther = 8.0 ** np.arange(-16, -5)
-    sides = place * (1 + np.multiply.outer([-1.0, 1.0], farther)[..., None])  # (2, shares, n)
+    # (2, shares, n)
+    sides = place * (1 + np.multiply.outer([-1.0, 1.0], farther)[..., None])
     own = np.array(loop.parts(1j * sides))
     h = (own[0] * own[1].conj()).imag
     decided = (h.prod(axis=0) < 0) & (abs(h).min(axis=0) > 4.0 * _spread(turned, place))
     opposite = ((own[:, 0] * own[:, 1].conj()).real < 0).any(axis=0)
     nearest = decided.argmax(axis=0)[None]
     turns = np.take_along_axis(opposite, nearest, 0)[0] | ~decided.any(axis=0)
-    crosses = (factor > AT_POLE) & (factor < 1 / AT_POLE) & ~turns
+    crosses = (factor > at_pole) & (factor < 1 / at_pole) & ~turns
     place = place[crosses]
     factor = factor[crosses]
     factor = round_near_poles(factor, _spread(lambda w: _factor(loop, w), place), CROSSOVER_DIGITS)
     found = list(map(PhaseCrossover, place.tolist(), factor.tolist()))
     low, lower = _factor(loop, omega[0] * np.array([1.0, 0.5]))
     # at rest -1/L is real, and does not change further down
-    if low.real > AT_POLE and max(abs(low.imag), abs(low - lower)) < 1e-3 * low.real:
+    if low.real > at_pole and max(abs(low.imag), abs(low - lower)) < 1e-3 * low.real:
         found.append(PhaseCrossover(0.0, float(low.real)))
     return tuple(sorted(found))
 
@@ -228,7 +271,8 @@ def unit_crossings(loop: Loop, omega: Real) -> Real:
         return np.empty(0)
 
     def size(w: Real) -> Real:
-        with np.errstate(divide="ignore"):  # where the hub stays at rest L is 0
+        # where the hub stays at rest L is 0
+        with np.errstate(divide="ignore"):
             return np.asarray(np.log(abs(loop.loop_function(1j * w))))
 
     (before,), _ = brackets(size(omega))
@@ -252,7 +296,9 @@ def lowest(
         inside = np.linspace(low, high, points)
         depth = f(inside.ravel()).reshape(inside.shape)
         lowest_one = depth.argmin(axis=0)[None]
-        low, high = (np.take_along_axis(inside, np.clip(lowest_one + way, 0, points - 1), 0)[0] for way in (-1, 1))
+        low, high = (
+            np.take_along_axis(inside, np.clip(lowest_one + way, 0, points - 1), 0)[0] for way in (-1, 1)
+        )
     least, at = min(zip(depth.ravel().tolist(), inside.ravel().tolist(), strict=True))
     (least,) = round_near_poles(np.array([least]), _spread(f, np.array([at])))
     return float(least), at

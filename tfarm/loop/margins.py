@@ -48,7 +48,8 @@ class Margins(LoopAnalysis):
 
     stability: Annotated[Stability, Quantity(flat=True)]
 
-    damping_limit = None  # is searched at the samples alone
+    # is searched at the samples alone
+    damping_limit = None
 
     @property
     def verdict(self) -> Stability:  # type: ignore[override]
@@ -63,14 +64,18 @@ class Margins(LoopAnalysis):
     @property
     def exact_delay(
         self,
-    ) -> Annotated[float | None, replace(DELAY_MARGIN, label=f"{DELAY_MARGIN.label}, exact", key="delay_margin_s")]:
+    ) -> Annotated[
+        float | None, replace(DELAY_MARGIN, label=f"{DELAY_MARGIN.label}, exact", key="delay_margin_s")
+    ]:
         """The delay margin [s]."""
         return self._exact[0]
 
     @property
     def exact_disk(
         self,
-    ) -> Annotated[float | None, replace(DISK_MARGIN, label=f"{DISK_MARGIN.label}, exact", key="disk_margin")]:
+    ) -> Annotated[
+        float | None, replace(DISK_MARGIN, label=f"{DISK_MARGIN.label}, exact", key="disk_margin")
+    ]:
         """The disk margin."""
         return self._exact[1]
 
@@ -105,12 +110,18 @@ class Margins(LoopAnalysis):
     @property
     def delay_margin_seconds(self) -> float | None:
         """The delay margin [s], or that in the frequency range where the exact one is not determined."""
-        return self.in_band.delay if self.in_band is not None and self.exact_delay is None else self.exact_delay
+        return (
+            self.in_band.delay if self.in_band is not None and self.exact_delay is None else self.exact_delay
+        )
 
     def factor_intervals(self, delays: Real) -> list[Sequence[Window]]:
         """Return the intervals of a factor on the law, 0 to 4, at each further delay [s] (n,), from a map of both."""
         loop = self.stability.loop
-        return [*plane(loop, ("delay", "gain"), loop.law.delay + delays, cell_middles(0.0, 4.0, 40)).stable_intervals]
+        return [
+            *plane(
+                loop, ("delay", "gain"), loop.law.delay + delays, cell_middles(0.0, 4.0, 40)
+            ).stable_intervals
+        ]
 
     @cached_property
     def windows(self) -> dict[str, Windows]:
@@ -129,34 +140,58 @@ class Margins(LoopAnalysis):
         return self.exact_peak if is_open or self.in_band is None else self.in_band.peak_complementary
 
     @property
-    def gain_margin(self) -> Annotated[tuple[float, float] | None, Quantity("gain margin, factors down and up",
-            help="factors on L between which the loop stays stable")]:  # fmt: skip
+    def gain_margin(
+        self,
+    ) -> Annotated[
+        tuple[float, float] | None,
+        Quantity("gain margin, factors down and up", help="factors on L between which the loop stays stable"),
+    ]:
         """Factors on the whole law between which the loop is stable."""
         return None if self.in_band is None else self.in_band.gain
 
     @property
-    def lyapunov(self) -> Annotated[Lyapunov | None, Quantity("Lyapunov function of the paper",
-            help="energy argument for constant gains at the hub")]:  # fmt: skip
+    def lyapunov(
+        self,
+    ) -> Annotated[
+        Lyapunov | None,
+        Quantity("Lyapunov function of the paper", help="energy argument for constant gains at the hub"),
+    ]:
         """The proof by energy, for gains at the hub."""
         loop = self.stability.loop
         return lyapunov(loop) if loop.is_of_gains else None
 
     @property
-    def passivity(self) -> Annotated[Signs | None, Quantity("passivity of the controller",
-            help="sign of the controller from hub angle or rate to torque")]:  # fmt: skip
+    def passivity(
+        self,
+    ) -> Annotated[
+        Signs | None,
+        Quantity(
+            "passivity of the controller", help="sign of the controller from hub angle or rate to torque"
+        ),
+    ]:
         """The sign of a law that is more than gains at the hub."""
         loop = self.stability.loop
         return None if loop.is_of_gains else signs_of_loop(loop)
 
     @property
-    def stability_intervals(self) -> Annotated[list[Windows], Quantity("stability intervals", first=True,
-            help="of each gain or coefficient alone, the others constant")]:  # fmt: skip
+    def stability_intervals(
+        self,
+    ) -> Annotated[
+        list[Windows],
+        Quantity(
+            "stability intervals", first=True, help="of each gain or coefficient alone, the others constant"
+        ),
+    ]:
         """One row for each number of the law, the others constant; without K2 on a free pin, where it has no loop."""
         return list(self.windows.values())
 
     @property
-    def intervals_note(self) -> Annotated[str | None, Quantity("limits of the intervals",
-            help="frequency range in which the intervals are known")]:  # fmt: skip
+    def intervals_note(
+        self,
+    ) -> Annotated[
+        str | None,
+        Quantity("limits of the intervals", help="frequency range in which the intervals are known"),
+    ]:
         """Frequency range of the intervals where nothing is known beyond it.
 
         A theorem on the sign of a law, and small gain, hold for that law, not for one with another number.
@@ -176,8 +211,9 @@ class Margins(LoopAnalysis):
         return () if self.in_band is None else self.in_band.gain_crossovers
 
     @property
-    def phase_crossovers(self) -> Annotated[tuple[PhaseCrossover, ...], replace(GAIN_CROSSOVERS,
-            label="phase crossovers, L < 0")]:  # fmt: skip
+    def phase_crossovers(
+        self,
+    ) -> Annotated[tuple[PhaseCrossover, ...], replace(GAIN_CROSSOVERS, label="phase crossovers, L < 0")]:
         """All in the frequency range, ascending; empty unless the loop is stable."""
         return () if self.in_band is None else self.in_band.phase_crossovers
 

@@ -20,27 +20,25 @@ from tfarm.arrays import Complex, Real
 from tfarm.case import Case
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
+from tfarm.loop.continuous import frequency_above_mode
+from tfarm.loop.curve import LoopContour, LoopVerdict
+from tfarm.loop.loop import Loop
+from tfarm.loop.stability import Stability, stability
 from tfarm.records import frozen
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import At, Quantity
 from tfarm.spectrum.box import argument_change
 
-from .continuous import frequency_above_mode
-from .curve import LoopContour, LoopVerdict
-from .loop import Loop
-from .stability import Stability, stability
-
-INDENT_RADIUS = 0.05  # radius of a semicircle around a pole of L, in units of its residue: |L| is about 20 on it
-NEARER = 0.1  # of the way to the nearest closed-loop pole: no arc around a pole of L leaves an unstable one out
-SLOW_POINTS = 200  # points between that and the arm's own grid
-ARC = np.linspace(-math.pi / 2, math.pi / 2, 41)  # rad, along a semicircle around a pole of L
-APPROACH = np.geomspace(1.05, 1e3, 40)  # radii of such an arc: points of the axis on either side, a dozen a decade
-RESIDUE_AT = 1e-6  # of a pole's frequency: so near to it L is the pole's share alone
-WIDEST_INDENT = 1e-3  # of the same: the radius of an arc at most, so that it reaches no neighbour
-LONGEST_PIECE = 0.02  # of the rim's radius: the longest straight piece of a drawn curve
-TURN_ROUNDS = 24  # of halving where they are longer
-ON_AXIS = Quantity("poles on the axis to working precision", help="closed-loop poles with |Re s| < 1e-12 |s|, not at 0")
-BY_NYQUIST = Quantity("unstable poles by Nyquist's criterion", help="unstable poles of L less the encirclements of -1")
+# rad, along a semicircle around a pole of L
+ARC = np.linspace(-math.pi / 2, math.pi / 2, 41)
+# radii of such an arc: points of the axis on either side, a dozen a decade
+APPROACH = np.geomspace(1.05, 1e3, 40)
+ON_AXIS = Quantity(
+    "poles on the axis to working precision", help="closed-loop poles with |Re s| < 1e-12 |s|, not at 0"
+)
+BY_NYQUIST = Quantity(
+    "unstable poles by Nyquist's criterion", help="unstable poles of L less the encirclements of -1"
+)
 
 
 @frozen
@@ -57,8 +55,11 @@ class Nyquist:
     is_arc: NDArray[np.bool_]
     poles: Real
     encirclements: Annotated[int, Quantity("encirclements of -1", help="counter-clockwise positive")]
-    verdict: Annotated[Stability | Any, Quantity(flat=True)]  # any `LoopVerdict`
-    unstable_open: Annotated[int, Quantity("unstable poles of L", help="controller's poles inside the contour")] = 0
+    # any `LoopVerdict`
+    verdict: Annotated[Stability | Any, Quantity(flat=True)]
+    unstable_open: Annotated[
+        int, Quantity("unstable poles of L", help="controller's poles inside the contour")
+    ] = 0
 
     @property
     def on_axis(self) -> Annotated[int, ON_AXIS]:
@@ -98,7 +99,9 @@ def nyquist_of(verdict: LoopVerdict) -> Nyquist:
     counted = plot.unstable_by_nyquist
     least = min(contour.clear, contour.unstable)
     if not least <= counted <= least + contour.near_axis:
-        text = f"{counted} unstable poles by the encirclements of -1, {contour.unstable} by finding all in a box"
+        text = (
+            f"{counted} unstable poles by the encirclements of -1, {contour.unstable} by finding all in a box"
+        )
         raise ConvergenceError(text, plot, counted - contour.unstable)
     return plot
 
@@ -114,16 +117,28 @@ def upper_contour(loop: Loop, contour: LoopContour, band: float) -> tuple[Comple
     Each arc around a pole of L is smaller than its distance to the nearest closed-loop pole.  The radius is that where
     |L| is about 20, and at most a thousandth of the pole's frequency (at 0: of the first).
     """
+    # radius of a semicircle around a pole of L, in units of its residue: |L| is about 20 on it
+    indent_radius = 0.05
+    # of the way to the nearest closed-loop pole: no arc around a pole of L leaves an unstable one out
+    nearer = 0.1
+    # points between that and the arm's own grid
+    slow_points = 200
+    # of a pole's frequency: so near to it L is the pole's share alone
+    residue_at = 1e-6
+    # of the same: the radius of an arc at most, so that it reaches no neighbour
+    widest_indent = 1e-3
     poles = contour.on_curve
     omega = contour.grid
     scale = np.where(poles == 0, frequency_above_mode(loop.arm, 1), poles)
     pole = poles[:, None]
-    step = RESIDUE_AT * scale
+    step = residue_at * scale
     away = abs(contour.closed - 1j * pole)
-    of_residue = INDENT_RADIUS * step * abs(loop.loop_function(np.where(poles == 0, step, 1j * (poles + step))))
+    of_residue = (
+        indent_radius * step * abs(loop.loop_function(np.where(poles == 0, step, 1j * (poles + step))))
+    )
     nearest = np.where(away > AXIS_SHARE * pole, away, math.inf).min(axis=1, initial=math.inf)
-    radius = np.minimum(np.minimum(of_residue, WIDEST_INDENT * scale), NEARER * nearest)[:, None]
-    slow = np.geomspace(radius[0, 0], omega[0], SLOW_POINTS) if 0 in poles else omega[:0]
+    radius = np.minimum(np.minimum(of_residue, widest_indent * scale), nearer * nearest)[:, None]
+    slow = np.geomspace(radius[0, 0], omega[0], slow_points) if 0 in poles else omega[:0]
     approach = (pole + radius * np.r_[-APPROACH, APPROACH]).ravel()
     axis = np.unique(np.r_[omega, slow, approach])
     axis = axis[(axis > 0) & (axis <= band) & (abs(axis - pole) > radius).all(axis=0)]
@@ -137,9 +152,13 @@ def upper_contour(loop: Loop, contour: LoopContour, band: float) -> tuple[Comple
 
 def smooth(loop: Loop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
     """The contour with more points on the axis where the drawn curve would have corners."""
-    for _ in range(TURN_ROUNDS):
+    # of the rim's radius: the longest straight piece of a drawn curve
+    longest_piece = 0.02
+    # of halving where they are longer
+    turn_rounds = 24
+    for _ in range(turn_rounds):
         length = abs(np.diff(compress_radius(loop.loop_function(s))))
-        (coarse,) = np.nonzero((length > LONGEST_PIECE) & ~is_arc[1:] & ~is_arc[:-1])
+        (coarse,) = np.nonzero((length > longest_piece) & ~is_arc[1:] & ~is_arc[:-1])
         if not coarse.size:
             break
         s = np.insert(s, coarse + 1, (s[coarse] + s[coarse + 1]) / 2)

@@ -23,25 +23,26 @@ import numpy as np
 from tfarm.arm import AT_HUB, Arm, must_turn
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, require
+from tfarm.loop.continuous import ContinuousLoop, frequency_above_mode, steep_places
 from tfarm.records import frozen
 from tfarm.response import transfer
 from tfarm.response.signals import Signals
 from tfarm.spectrum import Modes, modes
 
-from .continuous import ContinuousLoop, frequency_above_mode, steep_places
-
-PANEL_SAMPLES = 24  # of order 1/2 as the parts are, few more never help where a panel holds one mode
-STEEP_A_PANEL = 3  # steep places a panel: each mode has one of the own, the locked and the free hub
-MOST_MISS = 1e-11  # of the size of a part on its panel: a panel whose polynomials miss by more is halved
-MOST_PANELS = 400  # more mean that halving does not help
-BETWEEN_SAMPLES = np.linspace(-0.97, 0.97, 40)  # where they are compared, in the panel: not at s = 0
+# of order 1/2 as the parts are, few more never help where a panel holds one mode
+PANEL_SAMPLES = 24
+# of the size of a part on its panel: a panel whose polynomials miss by more is halved
+MOST_MISS = 1e-11
+# more mean that halving does not help
+MOST_PANELS = 400
+# where they are compared, in the panel: not at s = 0
+BETWEEN_SAMPLES = np.linspace(-0.97, 0.97, 40)
 _ANGLES = np.pi * (np.arange(PANEL_SAMPLES) + 0.5) / PANEL_SAMPLES
-CHEBYSHEV = np.cos(_ANGLES)  # points of the first kind, where the samples are: none in the middle
-BARYCENTRIC = (-1.0) ** np.arange(PANEL_SAMPLES) * np.sin(_ANGLES)  # weights of the polynomial through them
+# points of the first kind, where the samples are: none in the middle
+CHEBYSHEV = np.cos(_ANGLES)
+# weights of the polynomial through them
+BARYCENTRIC = (-1.0) ** np.arange(PANEL_SAMPLES) * np.sin(_ANGLES)
 Sensor = Literal["displacement", "moment"]
-
-SENSOR_ZERO_ERROR = 1e-8  # of the size of a zero: a smaller real or imaginary part of it is rounding
-NOT_SENSED = 1e-9  # of a mode's largest: a reading no larger of any mode is none
 
 
 @frozen
@@ -67,6 +68,8 @@ def loop_panels(arm: Arm, band: float, loop: ContinuousLoop | None = None) -> Pa
 
     Raises ParameterError for an arm that cannot turn freely, ConvergenceError where halving panels does not help.
     """
+    # steep places a panel: each mode has one of the own, the locked and the free hub
+    steep_a_panel = 3
     require(arm.has_rigid_mode, "arm", arm.name, "samples of a loop are of an arm that turns freely")
     order = 1 if arm.rate_loss else 2
     rows: Callable[[Complex], Complex] = partial(_hub_rows, arm, order)
@@ -74,7 +77,7 @@ def loop_panels(arm: Arm, band: float, loop: ContinuousLoop | None = None) -> Pa
         at_rest = loop.k.at_rest + int((loop.law.poles == 0).sum())
         order = at_rest - loop.zeros_at_origin
         rows = partial(_law_rows, loop, at_rest)
-    places = np.asarray(steep_places(arm, band))[STEEP_A_PANEL - 1 :: STEEP_A_PANEL]
+    places = np.asarray(steep_places(arm, band))[steep_a_panel - 1 :: steep_a_panel]
     edges = np.r_[0.0, places[places < band], band]
     waiting = [(-edges[1], edges[1]), *itertools.pairwise(edges[1:])]
     done: list[tuple[float, float, Complex, float]] = []
@@ -138,7 +141,9 @@ class Positions:
     @property
     def known_zeros(self) -> tuple[Complex, ...]:
         """The same, with 0 for a real or imaginary part below the error of a zero."""
-        parts = ((s, SENSOR_ZERO_ERROR * abs(s)) for s in self.zeros)
+        # of the size of a zero: a smaller real or imaginary part of it is rounding
+        sensor_zero_error = 1e-8
+        parts = ((s, sensor_zero_error * abs(s)) for s in self.zeros)
         return tuple(
             np.where(abs(s.real) > least, s.real, 0.0) + 1j * np.where(abs(s.imag) > least, s.imag, 0.0)
             for s, least in parts
@@ -147,8 +152,10 @@ class Positions:
 
 def sensed_places(arm: Arm, sensor: Sensor, x: Real, count: int) -> Real:
     """The places x [m] at which a sensor reads any of the first modes: not an end that none moves, or bends."""
+    # of a mode's largest: a reading no larger of any mode is none
+    not_sensed = 1e-9
     size = _fields(modes(arm, count), sensor, x)
-    return np.asarray(x[(abs(size) > NOT_SENSED * abs(size).max(axis=1, keepdims=True)).any(axis=0)])
+    return np.asarray(x[(abs(size) > not_sensed * abs(size).max(axis=1, keepdims=True)).any(axis=0)])
 
 
 def _fields(found: Modes, sensor: Sensor, x: Real) -> Real:

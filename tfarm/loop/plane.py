@@ -52,15 +52,24 @@ from tfarm.spectrum import modes
 from tfarm.spectrum.gains import PAPER_GAINS, default_gains, rate_unit
 from tfarm.spectrum.table import hub_locked
 
-COUNTS = Quantity(key="unstable_roots", help="unstable poles at each point, rows upwards; inf where infinitely many")
-BOUNDARY = Quantity(key="boundary", help="both gains and the frequency [rad/s] with poles on the imaginary axis")
-INFINITE = -1  # count of infinitely many unstable poles
-NOT_AFFINE = ("delay", ".den.")  # in the name of a number in which L is not affine: its size is not largest at corners
-LINEAR_SCALE = 0.5  # decades that the linear part of an axis takes on each side of 0, as matplotlib's `linscale` has it
-LINEAR_SHARE = LINEAR_SCALE / (1 - 1 / 10)  # factor on values there
-DEEPEST_MOMENT_GAIN = -50.0  # and the lowest value at which unstable gains are searched
-SHORT_SEGMENT = 0.008  # of the picture: longer pieces of the boundary look straight, and are cut
-LONG_SEGMENT = 0.03  # of the picture: a piece longer than that after all cuts is a jump through infinity, and not drawn
+COUNTS = Quantity(
+    key="unstable_roots", help="unstable poles at each point, rows upwards; inf where infinitely many"
+)
+BOUNDARY = Quantity(
+    key="boundary", help="both gains and the frequency [rad/s] with poles on the imaginary axis"
+)
+# count of infinitely many unstable poles
+INFINITE = -1
+# decades that the linear part of an axis takes on each side of 0, as matplotlib's `linscale` has it
+LINEAR_SCALE = 0.5
+# factor on values there
+LINEAR_SHARE = LINEAR_SCALE / (1 - 1 / 10)
+# and the lowest value at which unstable gains are searched
+DEEPEST_MOMENT_GAIN = -50.0
+# of the picture: longer pieces of the boundary look straight, and are cut
+SHORT_SEGMENT = 0.008
+# of the picture: a piece longer than that after all cuts is a jump through infinity, and not drawn
+LONG_SEGMENT = 0.03
 
 
 class BoundaryLines(NamedTuple):
@@ -93,7 +102,9 @@ class Plane(PlaneOfCounts):
     y: Annotated[Real, Quantity(curve=True, help="values of the second number")]
     unstable: NDArray[np.int64]
     boundary: Real
-    band: Annotated[float, Quantity(key="up_to_rad_s", help="end of the range; 0 where a theorem decides every mode")]
+    band: Annotated[
+        float, Quantity(key="up_to_rad_s", help="end of the range; 0 where a theorem decides every mode")
+    ]
     crossings: list[Crossings]
 
     @property
@@ -124,9 +135,11 @@ class Plane(PlaneOfCounts):
     @property
     def boundary_inside(self) -> Annotated[list[list[float]], BOUNDARY]:
         """The points of `boundary` inside the plane."""
-        return [point for point in self.boundary.tolist() if all(
-            values[0] <= value <= values[-1] for value, values in zip(point, self.axes, strict=False)
-        )]  # fmt: skip
+        return [
+            point
+            for point in self.boundary.tolist()
+            if all(values[0] <= value <= values[-1] for value, values in zip(point, self.axes, strict=False))
+        ]
 
     @property
     def is_of_gains(self) -> bool:
@@ -174,13 +187,20 @@ class Plane(PlaneOfCounts):
         arm = self.arm
         drifts = (self.x == 0) & arm.has_rigid_mode & (self.Kp == 0)
         swings = (self.upright == self.x) & arm.loses_at_hub_alone
-        passed = (self.upright >= self.x) & (not arm.hub_side_inertia)  # a pole has passed through infinity
+        # a pole has passed through infinity
+        passed = (self.upright >= self.x) & (not arm.hub_side_inertia)
         no_moment_is_left = np.equal(self.y, arm.input_per_torque) & self.is_known
         return np.asarray((self.unstable == 0) & ~(drifts | swings | passed) & ~no_moment_is_left[:, None])
 
 
 def gain_map(
-    arm: Arm, K1: Real, K2: Real, Kp: float = 0.0, *, law: AnyLaw | None = None, vary: tuple[str, str] | None = None
+    arm: Arm,
+    K1: Real,
+    K2: Real,
+    Kp: float = 0.0,
+    *,
+    law: AnyLaw | None = None,
+    vary: tuple[str, str] | None = None,
 ) -> Plane:
     """Return the number of unstable poles over the plane of K1 and K2 (1-D, ascending), and its exact boundary.
 
@@ -207,6 +227,8 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
     Raises ParameterError for an unknown number, an invalid loop or range; ConvergenceError where poles cannot be
     counted.
     """
+    # in the name of a number in which L is not affine: its size is not largest at corners
+    not_affine = ("delay", ".den.")
     require(vary[0] != vary[1], "vary", list(vary), "two different numbers of the law")
     is_of_gains = vary == PLANE and loop.is_of_gains
     if is_of_gains:
@@ -241,17 +263,22 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
     def counted(*point: float) -> int | None:
         try:
             return unstable_below(_at(loop, vary, point), band)
-        except ConvergenceError:  # a pole on the axis to working precision, which is on either side
+        except ConvergenceError:
+            # a pole on the axis to working precision, which is on either side
             return None
 
     # poles may enter or leave the band through its top, between the corners
-    if not is_quiet or any(part in name for part in NOT_AFFINE for name in vary):
-        remedy = f"some cross the end of the frequency range, {band:.4g} rad/s; ask for a smaller range of values"
+    if not is_quiet or any(part in name for part in not_affine for name in vary):
+        remedy = (
+            f"some cross the end of the frequency range, {band:.4g} rad/s; ask for a smaller range of values"
+        )
         done.must_agree(counted, remedy)
     return done
 
 
-def _columns(loop: ContinuousLoop, vary: tuple[str, str], x: Real, up: Window, band: float) -> list[Crossings]:
+def _columns(
+    loop: ContinuousLoop, vary: tuple[str, str], x: Real, up: Window, band: float
+) -> list[Crossings]:
     """The crossings along the second number at each value of the first; of gains of parts all at once."""
     terms = LawTerms(loop.signals, loop.law, [])
     if None in map(terms.part, vary):
@@ -303,14 +330,16 @@ def _farthest(values: Real, at: Real) -> int:
 def boundary(loop: ContinuousLoop, omega: Real) -> Real:
     """K1 and K2 with poles at +-i w, the other gains those of the loop, and w: (n, 3), in the order of omega."""
     if loop.arm.loses_at_hub_alone:
-        return np.empty((0, 3))  # both equations are one
+        # both equations are one
+        return np.empty((0, 3))
     apart = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
     terms = LawTerms(apart.signals, apart.law, [])
     rows = terms.at(1j * omega)
     N = terms.weights @ rows
     a, b = (terms.line(name).alone @ rows for name in PLANE)
     determinant = (a * b.conj()).imag
-    with np.errstate(all="ignore"):  # where both equations are one, the point is far away
+    # where both equations are one, the point is far away
+    with np.errstate(all="ignore"):
         K1 = -(N * b.conj()).imag / determinant
         K2 = (N * a.conj()).imag / determinant
     points = np.stack([K1, K2, omega], axis=1)
@@ -358,14 +387,18 @@ class Axis:
         if self.is_linear:
             return y
         size = abs(y) / LINEAR_SHARE, abs(y) - LINEAR_SHARE
-        return np.asarray(self.linear * np.sign(y) * np.minimum(size[0], 1.0) * 10.0 ** np.maximum(size[1], 0.0))
+        return np.asarray(
+            self.linear * np.sign(y) * np.minimum(size[0], 1.0) * 10.0 ** np.maximum(size[1], 0.0)
+        )
 
     def _stretched(self, x: Real) -> Real:
         """x where linear; else x over `linear` up to 1, then decades: matplotlib's "symlog"."""
         if self.is_linear:
             return x
         size = abs(x) / self.linear
-        return np.asarray(np.sign(x) * (LINEAR_SHARE * np.minimum(size, 1.0) + np.log10(np.maximum(size, 1.0))))
+        return np.asarray(
+            np.sign(x) * (LINEAR_SHARE * np.minimum(size, 1.0) + np.log10(np.maximum(size, 1.0)))
+        )
 
     @classmethod
     def of(cls, values: Real) -> Axis:

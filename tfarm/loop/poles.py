@@ -21,38 +21,39 @@ from tfarm.arrays import Complex
 from tfarm.case import Case
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, require
+from tfarm.loop.continuous import ContinuousLoop, frequency_above_mode, steep_places
+from tfarm.loop.theorem import CONSERVES, GIVES
 from tfarm.records import frozen
 from tfarm.reduced.modal import closed_loop_matrix, in_series, pade
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import Quantity
-from tfarm.spectrum.box import HEIGHTS_LEFT, RIGHT_OF_AXIS, TOWARD_SINGULAR, TRIED_HEIGHTS, Box, complete_zeros
+from tfarm.spectrum.box import (
+    HEIGHTS_LEFT,
+    RIGHT_OF_AXIS,
+    TOWARD_SINGULAR,
+    TRIED_HEIGHTS,
+    Box,
+    complete_zeros,
+)
 from tfarm.spectrum.damped import damped_starts
 from tfarm.spectrum.proofs import Disc, disjoint, enclose_zero, proven_count
 from tfarm.spectrum.table import first_frequency
 
-from .continuous import ContinuousLoop, frequency_above_mode, steep_places
-from .theorem import CONSERVES, GIVES
-
-MOST_POLES = 1000  # that may be asked for
-USUAL_POLES = 10  # poles listed where no count is asked for
-MOST_BOX_MODES = 4000  # flexible, below the highest box that is searched for as many poles as are asked for
-SLOW_SHARE = 1e-6  # of a box's height: poles nearer to 0 are known beforehand
-LEAST_REAL_PART = -0.5  # of L, so that 1 + L has no zero
-RIGHT_OF_EDGE = (2.0, 5.0, 20.0)  # times the right edge of a box, where L is evaluated again
+# poles listed where no count is asked for
+USUAL_POLES = 10
 # times that edge, and a law's fastest corner: the end of a search of real poles
 FAR_RIGHT = 1e5
-BEYOND_CORNER = 10.0
-FAR_POINTS = 41  # of the real axis up to there, on which 1 + L is smooth
-RIGHT_GROWS = 1.7  # times, from one right edge that is tried to the next: of effect on the time alone
-RIGHT_POINTS = 60  # of half a right edge, where Re L is evaluated: far from any pole of L, it is smooth
-MOST_HEIGHTS_RIGHT = 1e8  # that a box reaches at most: an improper law may have poles so far right
-LATE = 2.0  # of 1/delay: further left a delayed loop has ever more poles, and all of them are fast
-BEYOND_OWN = 1.1  # times the rightmost pole of a law, where L is infinite: the nearest right edge that is tried
+# that a box reaches at most: an improper law may have poles so far right
+MOST_HEIGHTS_RIGHT = 1e8
+# of 1/delay: further left a delayed loop has ever more poles, and all of them are fast
+LATE = 2.0
 # Starts of Newton's method affect the time alone: the winding number counts the zeros that they missed.
-STARTS_REACH = 1.3  # heights of the box: modes of the arm up to there, as a law may draw their poles down into it
-HUB = 0  # the number of the pole below the first mode that no mode of the link is near
-PADE = 8  # order of the approximation of a delay in a model
-SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)  # of a box that may not reach above the shear cut-off
+# the number of the pole below the first mode that no mode of the link is near
+HUB = 0
+# order of the approximation of a delay in a model
+PADE = 8
+# of a box that may not reach above the shear cut-off
+SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)
 
 
 ENDS_AT_SHEAR = Quantity(
@@ -77,15 +78,21 @@ class Poles:
     values: Annotated[Complex, Quantity("s", "1/s", 12, "closed-loop poles with Im s >= 0", key="poles")]
     box: Annotated[Box, Quantity("box: Re s from, to, Im s from, to", help="searched, and complete")]
     ends_at_shear_cutoff: Annotated[bool, ENDS_AT_SHEAR] = False
-    discs: Annotated[tuple[Disc, ...] | None, Quantity(help="enclosures of the poles apart from 0, certified")] = None
+    discs: Annotated[
+        tuple[Disc, ...] | None, Quantity(help="enclosures of the poles apart from 0, certified")
+    ] = None
 
     @property
-    def completeness(self) -> Annotated[str, Quantity("completeness", help="word of certainty for the list of poles")]:
+    def completeness(
+        self,
+    ) -> Annotated[str, Quantity("completeness", help="word of certainty for the list of poles")]:
         """The word of certainty for the list of poles in the box."""
         return "converged (winding number)" if self.discs is None else "certified"
 
     @property
-    def shear_cutoff(self) -> Annotated[float, Quantity(unit="rad/s", help="sqrt(kGA/rhoI): shear modes lie above")]:
+    def shear_cutoff(
+        self,
+    ) -> Annotated[float, Quantity(unit="rad/s", help="sqrt(kGA/rhoI): shear modes lie above")]:
         """sqrt(kGA/rhoI) [rad/s], above which lightly damped shear modes lie."""
         return self.loop.arm.shear_cutoff
 
@@ -143,8 +150,12 @@ def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles:
     fewer: then the box ends there.  With a count shear modes are included.
     Raises ParameterError where there is no loop, ConvergenceError where the box cannot be completed.
     """
+    # that may be asked for
+    most_poles = 1000
+    # flexible, below the highest box that is searched for as many poles as are asked for
+    most_box_modes = 4000
     if count is not None:
-        count = whole("count", count, 1, MOST_POLES, f"a whole number from 1 to {MOST_POLES}")
+        count = whole("count", count, 1, most_poles, f"a whole number from 1 to {most_poles}")
     loop = ContinuousLoop(Case(arm, law))
     wanted, limit = (USUAL_POLES, loop.arm.shear_cutoff) if count is None else (count, math.inf)
     number = wanted + 2
@@ -158,7 +169,7 @@ def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles:
             poles = poles_below(loop, height)
         if poles.values.size >= wanted:
             return first_poles(poles, count)
-        if number > MOST_BOX_MODES:
+        if number > most_box_modes:
             left, _, _, top = poles.box
             text = f"only {poles.values.size} poles right of {left:.4g} 1/s lie below {top:.4g} rad/s, not {wanted}"
             raise ConvergenceError(text, poles.values, wanted)
@@ -173,9 +184,16 @@ def poles_below(
     Left it reaches to about -1.5 heights, -0.8/C or -late/delay.  Where a zero lies on the edge of the box the next of
     the `factors` on the height is tried.
     """
-    starts = starting_points(loop, STARTS_REACH * height)
-    known = slow_poles(loop, SLOW_SHARE * height)
-    found, box = complete_zeros(loop.function, lambda top: box_of(loop, top, late), height, starts, known, factors)
+    # of a box's height: poles nearer to 0 are known beforehand
+    slow_share = 1e-6
+    # Starts of Newton's method affect the time alone: the winding number counts the zeros that they missed.
+    # heights of the box: modes of the arm up to there, as a law may draw their poles down into it
+    starts_reach = 1.3
+    starts = starting_points(loop, starts_reach * height)
+    known = slow_poles(loop, slow_share * height)
+    found, box = complete_zeros(
+        loop.function, lambda top: box_of(loop, top, late), height, starts, known, factors
+    )
     # without losses a simple zero is its own mirror image, and its real part is rounding
     is_even = loop.is_lossless or (loop.arm.is_undamped and loop.theorem.energy == CONSERVES)
     on_axis = is_even & (abs(found.real) <= AXIS_SHARE * abs(found))
@@ -187,16 +205,21 @@ def poles_below(
 
 def box_of(loop: ContinuousLoop, height: float, late: float = LATE) -> Box:
     """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
+    # times the rightmost pole of a law, where L is infinite: the nearest right edge that is tried
+    beyond_own = 1.1
     own = loop.law.poles
     C = loop.arm.damping
-    farthest = 1e8 * first_frequency(loop.arm)  # the phase of waves turns too often along a wider box
+    # the phase of waves turns too often along a wider box
+    farthest = 1e8 * first_frequency(loop.arm)
     if own.real.max(initial=0.0) > farthest:
         fastest = complex(own[own.real.argmax()])
         why = f"law: its pole at {fastest:.3g} 1/s is farther right than any box, as its den begins next to 0"
-        raise ConvergenceError(f"{why}; begin it with 0, which is another law, or a larger number", fastest, height)
+        raise ConvergenceError(
+            f"{why}; begin it with 0, which is another law, or a larger number", fastest, height
+        )
     right = RIGHT_OF_AXIS * height
     if own.size:
-        right = BEYOND_OWN * max([right, *own.real.tolist()])
+        right = beyond_own * max([right, *own.real.tolist()])
     right = quiet_edge(loop, right, height)
     clear = TOWARD_SINGULAR / C if C else np.inf
     left = min(HEIGHTS_LEFT * height, clear, late / loop.law.delay if loop.law.delay else np.inf)
@@ -210,15 +233,27 @@ def quiet_edge(loop: ContinuousLoop, right: float, height: float) -> float:
     real axis 1 + L keeps its sign for five decades more, and beyond the fastest corner of a law, where the inertia of a
     light hub begins to matter.
     """
-    edge = 1j * np.linspace(0.0, height, RIGHT_POINTS)
+    # of L, so that 1 + L has no zero
+    least_real_part = -0.5
+    # times the right edge of a box, where L is evaluated again
+    right_of_edge = (2.0, 5.0, 20.0)
+    beyond_corner = 10.0
+    # of the real axis up to there, on which 1 + L is smooth
+    far_points = 41
+    # times, from one right edge that is tried to the next: of effect on the time alone
+    right_grows = 1.7
+    # of half a right edge, where Re L is evaluated: far from any pole of L, it is smooth
+    right_points = 60
+    edge = 1j * np.linspace(0.0, height, right_points)
     corner = float(abs(loop.law.poles).max(initial=0.0))
     while right < MOST_HEIGHTS_RIGHT * height:
-        L = loop.loop_function(np.r_[right + edge, right * np.array(RIGHT_OF_EDGE)])
-        if L.real.min() > LEAST_REAL_PART:
+        L = loop.loop_function(np.r_[right + edge, right * np.array(right_of_edge)])
+        if L.real.min() > least_real_part:
             break
-        right *= RIGHT_GROWS
-    far = np.geomspace(right, max(FAR_RIGHT * right, BEYOND_CORNER * corner), FAR_POINTS)
-    with np.errstate(all="ignore"):  # powers of s may overflow so far right: these points are left out
+        right *= right_grows
+    far = np.geomspace(right, max(FAR_RIGHT * right, beyond_corner * corner), far_points)
+    # powers of s may overflow so far right: these points are left out
+    with np.errstate(all="ignore"):
         real_part = loop.loop_function(far.astype(complex)).real
     far = far[np.isfinite(real_part)]
     is_above = real_part[np.isfinite(real_part)] > -1
@@ -239,7 +274,8 @@ def slow_poles(loop: ContinuousLoop, below: float) -> Complex:
     slow = slow[(abs(slow) <= min(below, radius / 2)) & (slow != 0)]
     step = slow
     for _ in range(6 if slow.size else 0):
-        with np.errstate(all="ignore"):  # a start whose slope is rounding diverges, and is left out
+        # a start whose slope is rounding diverges, and is left out
+        with np.errstate(all="ignore"):
             at = loop.function(slow)
             step = at.value / at.slope
             slow = slow - step
@@ -258,7 +294,8 @@ def starting_points(loop: ContinuousLoop, up_to: float) -> Complex:
     turns = 2j * math.pi * np.arange(1.0, up_to * delay / (2 * math.pi))
     late = turns / (delay or 1.0)
     for _ in range(3 if late.size else 0):
-        with np.errstate(all="ignore"):  # at a pole or a zero of L
+        # at a pole or a zero of L
+        with np.errstate(all="ignore"):
             late = (np.log(-loop.loop_function(late) * np.exp(late * delay)) + turns) / delay
     starts = np.concatenate([near, real, late, late.conj(), loop.law.poles])
     return starts[np.isfinite(starts) & (starts != 0)]
@@ -276,7 +313,9 @@ def poles_by_mode(poles: Complex, open_loop: Mapping[int, complex]) -> dict[int,
     apart = np.minimum(abs(np.log(poles)[:, None] - np.log(own)), farthest)
     rows, columns = linear_sum_assignment(apart)
     near = apart[rows, columns] < farthest
-    found = {modes[column]: complex(poles[row]) for row, column in zip(rows[near], columns[near], strict=True)}
+    found = {
+        modes[column]: complex(poles[row]) for row, column in zip(rows[near], columns[near], strict=True)
+    }
     others = np.delete(poles, rows[near])
     below = others[abs(others) < min((abs(s) for s in found.values()), default=0.0)]
     return dict(sorted([*found.items(), *([(HUB, complex(below[0]))] if below.size == 1 else [])]))

@@ -58,10 +58,8 @@ from tfarm.records import frozen
 from tfarm.response.signals import ControllerSignals
 from tfarm.schema import Quantity
 
-MOST_STEPS = 200  # of all roots together: a cluster of nine takes 24
-UNMOVED = 1e-50  # an offset this small is a pole that the loop does not move
-LEAST_SQUARE = -1.0 + 1e-15  # for |z|^2 - 1 of a pole at z = 0, the base of no root
-FADED_RADIUS = 0.2  # a pole nearer to z = 0 is stable and not polished
+# a pole nearer to z = 0 is stable and not polished
+FADED_RADIUS = 0.2
 
 
 @frozen
@@ -183,7 +181,9 @@ class Sampled(Loop):
     def part(self, name: str) -> int:
         """The part whose weight is a number.  Raises ParameterError for any other number."""
         if (place := self.place(name)) is None:
-            raise ParameterError(key="law", value=name, remedy=did_you_mean(name, list(self.unit_law.part_gains)))
+            raise ParameterError(
+                key="law", value=name, remedy=did_you_mean(name, list(self.unit_law.part_gains))
+            )
         return place
 
     def weighted(self, weights: Sequence[float]) -> Sampled:
@@ -218,7 +218,9 @@ class Sampled(Loop):
 
     def on(self, arm: Arm, count: int) -> Sampled:
         """The loop of the same law on another arm, with `count` flexible modes."""
-        return replace(self, rig=replace(self.rig, sensed=sensed_plant(arm, self.chain, self.in_z.signals, count)))
+        return replace(
+            self, rig=replace(self.rig, sensed=sensed_plant(arm, self.chain, self.in_z.signals, count))
+        )
 
     @property
     def push(self) -> Real:
@@ -286,7 +288,8 @@ class Sampled(Loop):
         """The closed-loop matrix without the pole z = 1 of a free hub angle, or of a hub that cannot drift."""
         A = self.matrix()
         first = self.pulse.integrals_at
-        unfelt = 2 if not self.plant.arm.has_rigid_mode else int(self.rig.is_damped)  # its angle is the single integral
+        # its angle is the single integral
+        unfelt = 2 if not self.plant.arm.has_rigid_mode else int(self.rig.is_damped)
         felt = np.r_[np.arange(first), np.arange(first + unfelt, len(A))]
         A = A[np.ix_(felt, felt)]
         if not self.has_free_angle:
@@ -294,9 +297,11 @@ class Sampled(Loop):
         own, B, _, _ = self.in_z.matrices
         angle = self.pulse.matrices()[2][:, first + int(self.rig.is_damped)]
         shift = np.zeros(len(A))
-        shift[first] = 1.0  # and the states of the law where the hub is at rest at that angle
+        # and the states of the law where the hub is at rest at that angle
+        shift[first] = 1.0
         shift[len(A) - len(own) :] = np.linalg.lstsq(np.eye(len(own)) - own, B @ angle, rcond=None)[0]
-        others = np.arange(len(A)) != first  # the quotient by that direction
+        # the quotient by that direction
+        others = np.arange(len(A)) != first
         return A[others][:, others] - np.outer(shift[others], A[first, others])
 
     @cached_property
@@ -311,7 +316,9 @@ class Sampled(Loop):
         Such are an integrator of a signal that is 0 at rest, one of two parallel integrators, a hub without feedback of
         its rate.  The order of x^N F, N the poles of the plant there, at x = 1 - 1/z = 0 is the least of its terms.
         """
-        poles = 0 if not self.plant.arm.has_rigid_mode else (1 if self.rig.is_damped else 2) - self.has_free_angle
+        poles = (
+            0 if not self.plant.arm.has_rigid_mode else (1 if self.rig.is_damped else 2) - self.has_free_angle
+        )
         return max(0, poles + min(n for n, _ in self.rig.near_one(self.row)))
 
     @property
@@ -325,6 +332,8 @@ class Sampled(Loop):
 
         Those next to z = 0 are stable, and not polished.
         """
+        # for |z|^2 - 1 of a pole at z = 0, the base of no root
+        least_square = -1.0 + 1e-15
         z = self.eigenvalues.copy()
         shifts = self.rig.open_loop
         pulse = self.pulse
@@ -343,7 +352,7 @@ class Sampled(Loop):
             offset = offset + (shifts[base] - shifts[nearest])
             base = nearest
         own = 2 * self.in_z.poles.real + abs(self.in_z.poles) ** 2
-        start = np.r_[pulse.poles.real * pulse.sampling.period, np.log1p(np.maximum(own, LEAST_SQUARE)) / 2]
+        start = np.r_[pulse.poles.real * pulse.sampling.period, np.log1p(np.maximum(own, least_square)) / 2]
         at = base[rows]
         o = offset[rows]
         ratio = o / (1 + shifts[at])
@@ -360,12 +369,16 @@ class OfLoop:
     loop: Sampled
 
     @property
-    def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
+    def controller(
+        self,
+    ) -> Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]:
         """Names of the arm and the controller."""
         return self.loop.controller
 
     @property
-    def sampling(self) -> Annotated[Sampling, Quantity(flat=True, help="sampling period and delay of the loop")]:
+    def sampling(
+        self,
+    ) -> Annotated[Sampling, Quantity(flat=True, help="sampling period and delay of the loop")]:
         """Period and delay."""
         return self.loop.chain.sampling
 
@@ -392,12 +405,17 @@ def _settled(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[
 
     These are the radii of Smith's discs, and the rounding of a pole of the law; 0 of the others.
     """
+    # of all roots together: a cluster of nine takes 24
+    most_steps = 200
+    # an offset this small is a pole that the loop does not move
+    unmoved = 1e-50
     error = np.zeros(offset.size)
     offset = offset.copy()
     # for an offset of 0: next to 1 that is none
     offset[rows] = np.where(offset[rows] == 0, 1e-17, offset[rows])
-    with np.errstate(all="ignore"):  # a root on an open-loop pole, and one that diverges
-        for _ in range(MOST_STEPS):
+    # a root on an open-loop pole, and one that diverges
+    with np.errstate(all="ignore"):
+        for _ in range(most_steps):
             o = offset[rows]
             f, slope, apart = _weierstrass(base, offset, rows, loop)
             W = np.nan_to_num(f / slope, posinf=0.0, neginf=0.0)
@@ -406,32 +424,38 @@ def _settled(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[
             step = np.nan_to_num(W / (1 + others.sum(axis=1)), posinf=0.0, neginf=0.0)
             # of the offset: a smaller step is below its rounding
             moving = abs(step) > 1e-12 * abs(o)
-            offset[rows] = np.where(abs(o - step) < UNMOVED, UNMOVED, o - step)
+            offset[rows] = np.where(abs(o - step) < unmoved, unmoved, o - step)
             if (abs(f[moving]) <= loop.rounding(base[rows[moving]], o[moving])).all():
                 break
-        offset[abs(offset) <= UNMOVED] = 0.0
+        offset[abs(offset) <= unmoved] = 0.0
         f, slope, _ = _weierstrass(base, offset, rows, loop)
         radius = offset.size * (abs(f) + loop.rounding(base[rows], offset[rows])) / abs(slope)
     own = np.where(base[rows] < loop.pulse.poles.size, 0.0, MACHINE_EPS * abs(loop.rig.open_loop[base[rows]]))
-    error[rows] = np.nan_to_num(radius, posinf=0.0) + own  # of a pole that the loop does not move 0/0
+    # of a pole that the loop does not move 0/0
+    error[rows] = np.nan_to_num(radius, posinf=0.0) + own
     return offset, error
 
 
-def _weierstrass(base: Whole, offset: Complex, rows: Whole, loop: Sampled) -> tuple[Complex, Complex, Complex]:
+def _weierstrass(
+    base: Whole, offset: Complex, rows: Whole, loop: Sampled
+) -> tuple[Complex, Complex, Complex]:
     """At some roots o F and o F/W, and their distances from all roots, 1 from themselves."""
     pulse = loop.pulse
     b = base[rows]
     o = offset[rows]
     one = loop.rig.open_loop[b]
-    known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]  # the other poles are at z = 1
+    # the other poles are at z = 1
+    known = np.r_[pulse.shifts[:-1], np.full(pulse.sampling.whole_delay + 1, -1.0)]
     poles = np.r_[known, np.zeros(max(0, offset.size - known.size - loop.in_z.poles.size))]
     apart = (one[:, None] - loop.rig.open_loop[base]) + (o[:, None] - offset)
     apart[np.arange(rows.size), rows] = 1.0
     away = (one[:, None] - poles) + o[:, None]
     of_plant = b < pulse.poles.size
     own = np.where(b == pulse.poles.size - 1, known.size, b)
-    listed = of_plant & (own < poles.size)  # but where a free hub angle has the pole at z = 1
-    away[listed, own[listed]] = 1.0  # F is times the distance from that pole
+    # but where a free hub angle has the pole at z = 1
+    listed = of_plant & (own < poles.size)
+    # F is times the distance from that pole
+    away[listed, own[listed]] = 1.0
     of_poles = (apart[:, : poles.size] / away).prod(axis=1)
     others = apart[:, poles.size :].prod(axis=1)
     slope = np.where(of_plant & ~listed, o, 1.0) * of_poles * others
@@ -452,7 +476,9 @@ def sampled_loop(case: Case, *, count: int = USUAL_MODES) -> Sampled:
         weights[place] = value
         law, acting = (each.having(name, 1.0) for each in (law, acting))
     in_z = law_in_z(law, acting, chain)
-    return Sampled(SampledRig(sensed_plant(case.arm, chain, in_z.signals, count), chain, in_z), law, tuple(weights))
+    return Sampled(
+        SampledRig(sensed_plant(case.arm, chain, in_z.signals, count), chain, in_z), law, tuple(weights)
+    )
 
 
 def with_more_modes(loop: Sampled, count: int) -> Sampled:

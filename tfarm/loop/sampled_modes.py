@@ -27,12 +27,13 @@ from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
-FOLLOWING_STEPS = 24  # of the continuation from zero gain
-SAMPLED_LOCUS_VALUES = 61  # of a gain along its locus, to begin with
-RIM = 1.12  # radius up to which the z-plane is shown
-DRAWN_RADIUS = 1.2 * RIM  # and up to which a branch is drawn, so that its line runs out of the picture
+# of a gain along its locus, to begin with
+SAMPLED_LOCUS_VALUES = 61
+# radius up to which the z-plane is shown
+RIM = 1.12
+# and up to which a branch is drawn, so that its line runs out of the picture
+DRAWN_RADIUS = 1.2 * RIM
 # of the rate gain: below the end of its locus, and above its own value
-RATE_DECADES = 3
 STRONGER = 10.0
 
 
@@ -49,25 +50,72 @@ class ModeTable:
     is_table = True
 
     index: Annotated[NDArray[np.int64], Quantity("mode", help="number of the flexible mode")]
-    natural_frequency: Annotated[Real, Quantity("natural frequency", "rad/s",
-            help="undamped natural frequency of the mode without the controller")]  # fmt: skip
-    band: Annotated[NDArray[np.int64], Quantity("Nyquist zone",
-            help="0 from 0 to half the sampling rate, 1 from there to the whole rate")]  # fmt: skip
-    aliased: Annotated[Real, Quantity("aliased to", "rad/s",
-            help="apparent frequency of the sampled mode, below half the sampling rate")]  # fmt: skip
-    by_rate: Annotated[Real, Quantity("by K1", digits=3, key="first_order_by_K1",
-            help="change of ln|z| per sample by hub-rate feedback, to first order; below 0 damps")]  # fmt: skip
-    by_moment: Annotated[Real, Quantity("by K2", digits=3, key="first_order_by_K2",
-            help="change of ln|z| per sample by root-moment feedback, to first order")]  # fmt: skip
+    natural_frequency: Annotated[
+        Real,
+        Quantity(
+            "natural frequency", "rad/s", help="undamped natural frequency of the mode without the controller"
+        ),
+    ]
+    band: Annotated[
+        NDArray[np.int64],
+        Quantity("Nyquist zone", help="0 from 0 to half the sampling rate, 1 from there to the whole rate"),
+    ]
+    aliased: Annotated[
+        Real,
+        Quantity(
+            "aliased to", "rad/s", help="apparent frequency of the sampled mode, below half the sampling rate"
+        ),
+    ]
+    by_rate: Annotated[
+        Real,
+        Quantity(
+            "by K1",
+            digits=3,
+            key="first_order_by_K1",
+            help="change of ln|z| per sample by hub-rate feedback, to first order; below 0 damps",
+        ),
+    ]
+    by_moment: Annotated[
+        Real,
+        Quantity(
+            "by K2",
+            digits=3,
+            key="first_order_by_K2",
+            help="change of ln|z| per sample by root-moment feedback, to first order",
+        ),
+    ]
     by_others: Real
-    by_damping: Annotated[Real, Quantity("open loop", digits=4, key="open_loop_log_radius",
-            help="ln|z| per sample of the mode without the controller, by damping of the arm")]  # fmt: skip
-    log_radius: Annotated[Real, Quantity("closed loop", digits=4, key="log_radius_per_sample",
-            help="ln|z| per sample of the closed-loop pole; above 0 it is unstable")]  # fmt: skip
+    by_damping: Annotated[
+        Real,
+        Quantity(
+            "open loop",
+            digits=4,
+            key="open_loop_log_radius",
+            help="ln|z| per sample of the mode without the controller, by damping of the arm",
+        ),
+    ]
+    log_radius: Annotated[
+        Real,
+        Quantity(
+            "closed loop",
+            digits=4,
+            key="log_radius_per_sample",
+            help="ln|z| per sample of the closed-loop pole; above 0 it is unstable",
+        ),
+    ]
 
     @property
-    def first_order(self) -> Annotated[Real, Quantity("first order", digits=3, key="first_order_log_radius",
-            help="change of ln|z| per sample by the whole controller, to first order")]:  # fmt: skip
+    def first_order(
+        self,
+    ) -> Annotated[
+        Real,
+        Quantity(
+            "first order",
+            digits=3,
+            key="first_order_log_radius",
+            help="change of ln|z| per sample by the whole controller, to first order",
+        ),
+    ]:
         """Change of ln|z| per sample by all gains."""
         return self.by_rate + self.by_moment + self.by_others
 
@@ -77,7 +125,8 @@ def first_order(loop: Sampled, poles: Whole) -> Real:
     z = loop.pulse.multipliers[poles]
     _, *rows = loop.rig.terms(z, poles, np.zeros(z.size))
     whole = (loop.pulse.shifts[poles][:, None] - loop.in_z.poles).prod(axis=1)
-    return np.asarray(-(np.array(loop.weights)[:, None] * rows / (z * whole)).real) + 0.0  # -0.0 where a weight is 0
+    # -0.0 where a weight is 0
+    return np.asarray(-(np.array(loop.weights)[:, None] * rows / (z * whole)).real) + 0.0
 
 
 def mode_table(loop: Sampled) -> ModeTable:
@@ -93,12 +142,16 @@ def mode_table(loop: Sampled) -> ModeTable:
     w = table.natural_frequency[np.searchsorted(table.index, index)]
     by = first_order(loop, upper)
     reads = [part.signals for part in loop.law.parts]
-    by_rate, by_moment = (by[[each == (name,) for each in reads]].sum(axis=0) for name in ("hub_rate", "root_moment"))
+    by_rate, by_moment = (
+        by[[each == (name,) for each in reads]].sum(axis=0) for name in ("hub_rate", "root_moment")
+    )
     turns = np.round(w * T / (2 * np.pi))
     origin = origins(loop)
     # poles from a mode's pole and its conjugate: two radii where both have become real
     conjugate = abs(pulse.poles - pulse.poles[upper].conj()[:, None]).argmin(axis=1)
-    radii = [loop.poles.log_radius[np.isin(origin, pair)].max() for pair in zip(upper, conjugate, strict=True)]
+    radii = [
+        loop.poles.log_radius[np.isin(origin, pair)].max() for pair in zip(upper, conjugate, strict=True)
+    ]
     return ModeTable(
         index=index,
         natural_frequency=w,
@@ -135,10 +188,12 @@ def origins(loop: Sampled) -> NDArray[np.int64]:
     These are numbered as in `PulseTransfer.poles`, those of the law after them.  A factor on the law grows from nearly
     0, and each pole is followed.
     """
+    # of the continuation from zero gain
+    following_steps = 24
     open_loop = np.r_[loop.pulse.multipliers, 1 + loop.in_z.poles]
     labels = np.flatnonzero(np.r_[loop.pulse.poles != 0, loop.in_z.poles + 1 != 0])
     # 1e-6 of the gains: there each pole is still at that of the plant
-    scales = np.r_[1e-6, np.arange(1, FOLLOWING_STEPS) / FOLLOWING_STEPS, 1.0]
+    scales = np.r_[1e-6, np.arange(1, following_steps) / following_steps, 1.0]
     first, *others = (loop.times(scale).eigenvalues for scale in scales[:-1].tolist())
     poles = [first[_matched(open_loop[labels], first)], *others, loop.eigenvalues]
     origin = np.full(loop.eigenvalues.size, -1)
@@ -155,7 +210,9 @@ def dominant(loop: Sampled) -> str:
     origin = int(origins(loop)[loop.poles.log_radius.argmax()])
     if origin >= loop.pulse.poles.size:
         return "a pole of the law"
-    mode, rings = (int(loop.pulse.mode[origin]), loop.pulse.poles[origin].imag != 0) if origin >= 0 else (0, False)
+    mode, rings = (
+        (int(loop.pulse.mode[origin]), loop.pulse.poles[origin].imag != 0) if origin >= 0 else (0, False)
+    )
     return f"mode {mode}" if mode else "an unassigned mode" if rings else "the hub"
 
 
@@ -205,9 +262,13 @@ def sampled_loci(loop: Sampled, top: float, moments: tuple[float, float]) -> Sam
 
     That of the rate gain begins below the gain of the loop.
     """
-    lowest = min(top / 10**RATE_DECADES, loop.number(RATE_GAIN) / STRONGER)
+    # of the rate gain: below the end of its locus, and above its own value
+    rate_decades = 3
+    lowest = min(top / 10**rate_decades, loop.number(RATE_GAIN) / STRONGER)
     values = np.geomspace(lowest, top, SAMPLED_LOCUS_VALUES), np.linspace(*moments, SAMPLED_LOCUS_VALUES)
-    return SampledLoci(loop, {name: sampled_locus(loop, name, each) for name, each in zip(PLANE, values, strict=True)})
+    return SampledLoci(
+        loop, {name: sampled_locus(loop, name, each) for name, each in zip(PLANE, values, strict=True)}
+    )
 
 
 def sampled_locus(loop: Sampled, gain: str, values: Real) -> SampledLocus:

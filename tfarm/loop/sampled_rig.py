@@ -23,9 +23,12 @@ from tfarm.dsp.discretise import LawInZ, lowest_power, root_product
 from tfarm.dsp.plant import Plant, PulseTransfer, SensedPlant, is_analog
 from tfarm.records import frozen
 
-NARROWEST_WIDTH = 1e-17  # rad, of a pole: closer to it angles are not distinct
-WIDTH_SHARE = 1e-2  # of the distance of a pole from the circle: the grid begins so near to it
-BRIGHT = 1e-2  # poles and roots nearer to z = 0 have no narrow feature on the circle
+# rad, of a pole: closer to it angles are not distinct
+NARROWEST_WIDTH = 1e-17
+# of the distance of a pole from the circle: the grid begins so near to it
+WIDTH_SHARE = 1e-2
+# poles and roots nearer to z = 0 have no narrow feature on the circle
+BRIGHT = 1e-2
 
 
 @frozen
@@ -153,10 +156,13 @@ class CircleGrid:
 
     def steps(self, number: Whole) -> Steps:
         """The steps from the points of these numbers to the next, as angles from the pole of each."""
-        base = self.base[number]  # where the next point has another pole, both are as far away
+        # where the next point has another pole, both are as far away
+        base = self.base[number]
         is_own = base == self.base[number + 1]
         high = np.where(is_own, self.shift[number + 1], self.q[number + 1] - self.angles[base])
-        return Steps(self.shift[number], high, lambda shift, which: self.at(base[which], shift), self.angles[base])
+        return Steps(
+            self.shift[number], high, lambda shift, which: self.at(base[which], shift), self.angles[base]
+        )
 
     def at(self, base: Whole, shift: Real) -> Complex:
         """Return the rig's `terms` at other points."""
@@ -186,7 +192,8 @@ def circle_grid(rig: SampledRig) -> CircleGrid:
     shift.append(extra - angles[base[-1]])
     whole = CircleGrid(rig, np.concatenate(base), np.concatenate(shift))
     order = np.lexsort((whole.shift, np.searchsorted(seams, whole.q, side="left"), whole.q))
-    away = abs(1 - pulse.multipliers[bases])  # 0 of the last, the pole of an arm that drifts
+    # 0 of the last, the pole of an arm that drifts
+    away = abs(1 - pulse.multipliers[bases])
     # nearer to z = 1 the rate of a held arm is rounding, and a gain on it would have to be 1e8 times too large
     still = 1e-8
     lowest = 0.0 if rig.plant.rigid.any() else still * away[away > 0].min(initial=1.0)
@@ -196,7 +203,8 @@ def circle_grid(rig: SampledRig) -> CircleGrid:
 
 def _next_to_roots(roots: Complex) -> Iterator[Real]:
     """Angles on the upper half of the circle at geometric distances from some roots."""
-    for root in roots[(abs(roots) > BRIGHT) & (roots.imag >= 0)]:  # the upper of each pair
+    # the upper of each pair
+    for root in roots[(abs(roots) > BRIGHT) & (roots.imag >= 0)]:
         near = geometric(math.pi, max(WIDTH_SHARE * abs(1 - abs(root)), NARROWEST_WIDTH))
         q = abs(np.angle(root)) + np.r_[-near, near]
         yield q[(q > 0) & (q < math.pi)]

@@ -47,14 +47,12 @@ SAMPLED_LOOP = Consumer(
     partly=("arithmetic",),
     none=("reference", "volts"),
 )
-UNDAMPED_MODES = 20  # of an undamped arm, whose verdict is of the first modes alone
-RADIUS_AGREES = 1e-4  # of ln of the spectral radius: its largest error with fewer modes
-RADIUS_NOISE = 1e-12  # and its rounding error
-ON_CIRCLE = 1e-12  # of ln|z|: an open-loop pole so near to the circle is on it
-MOST_COUNT = 400  # modes that may be asked for
+# of an undamped arm, whose verdict is of the first modes alone
+UNDAMPED_MODES = 20
+# of ln of the spectral radius: its largest error with fewer modes
+RADIUS_AGREES = 1e-4
 # origins of a sampling period
 DEFAULT_PERIOD = "tfarm's default period"
-LAWS_PERIOD = "the controller's period"
 
 
 @frozen
@@ -78,26 +76,47 @@ class Verdict(OfLoop, LoopVerdict):
         return rule_in_words(self.loop.law)
 
     @property
-    def is_settled(self) -> Annotated[bool, Quantity(key="certified",
-            help="whether the verdict is certified for every mode up to a frequency")]:  # fmt: skip
+    def is_settled(
+        self,
+    ) -> Annotated[
+        bool,
+        Quantity(key="certified", help="whether the verdict is certified for every mode up to a frequency"),
+    ]:
         """Whether the verdict is certified for every mode of the band and every slow real pole."""
         return self.band is not None
 
     @property
-    def band_rad_s(self) -> Annotated[float | None, Quantity("certified up to", "rad/s", key="up_to_rad_s",
-            help="end of the frequency range in which the verdict is certified")]:  # fmt: skip
+    def band_rad_s(
+        self,
+    ) -> Annotated[
+        float | None,
+        Quantity(
+            "certified up to",
+            "rad/s",
+            key="up_to_rad_s",
+            help="end of the frequency range in which the verdict is certified",
+        ),
+    ]:
         """End of the range in which the verdict is certified [rad/s]; None without one."""
         return None if self.band is None else self.band.top
 
     @property
-    def is_stable(self) -> Annotated[bool, Quantity(key="stable",
-            help="whether every pole lies inside the unit circle")]:  # fmt: skip
+    def is_stable(
+        self,
+    ) -> Annotated[bool, Quantity(key="stable", help="whether every pole lies inside the unit circle")]:
         """Whether every pole lies inside the unit circle."""
         return self.loop.poles.is_stable
 
     @property
-    def log_radius(self) -> Annotated[float, Quantity(key="log_spectral_radius",
-            help="ln of the largest |z| of the closed-loop poles; below 0 of a stable loop")]:  # fmt: skip
+    def log_radius(
+        self,
+    ) -> Annotated[
+        float,
+        Quantity(
+            key="log_spectral_radius",
+            help="ln of the largest |z| of the closed-loop poles; below 0 of a stable loop",
+        ),
+    ]:
         """ln of the spectral radius, of every mode of the band, or of the first `modes_used` without a band.
 
         The verdict needs few modes, but not the later digits of this number.
@@ -105,15 +124,24 @@ class Verdict(OfLoop, LoopVerdict):
         return self.full.poles.log_spectral_radius
 
     @property
-    def spectral_radius(self) -> Annotated[float, Quantity("spectral radius", digits=12,
-            help="largest |z| of the closed-loop poles but z = 1 of a free hub angle; below 1 if stable")]:  # fmt: skip
+    def spectral_radius(
+        self,
+    ) -> Annotated[
+        float,
+        Quantity(
+            "spectral radius",
+            digits=12,
+            help="largest |z| of the closed-loop poles but z = 1 of a free hub angle; below 1 if stable",
+        ),
+    ]:
         """Largest |z|; infinity where it overflows."""
         # of 700 the exponential is a double
         return math.exp(self.log_radius) if self.log_radius < 700.0 else math.inf
 
     @property
-    def unstable_poles(self) -> Annotated[int, Quantity("unstable poles",
-            help="closed-loop poles outside the unit circle")]:  # fmt: skip
+    def unstable_poles(
+        self,
+    ) -> Annotated[int, Quantity("unstable poles", help="closed-loop poles outside the unit circle")]:
         """Number of poles outside the unit circle."""
         return self.loop.poles.unstable
 
@@ -123,27 +151,54 @@ class Verdict(OfLoop, LoopVerdict):
         return self.loop if self.band is None else self.band.full
 
     @property
-    def word(self) -> Annotated[str, Quantity("stability", key="verdict",  # type: ignore[override]
-            help="stable, marginal (largest |z| = 1 within its rounding error) or unstable")]:  # fmt: skip
+    def word(  # type: ignore[override]
+        self,
+    ) -> Annotated[
+        str,
+        Quantity(
+            "stability",
+            key="verdict",
+            help="stable, marginal (largest |z| = 1 within its rounding error) or unstable",
+        ),
+    ]:
         """stable, marginal or unstable."""
         growth = self.log_radius
         return "unstable" if growth > 0 else "stable" if growth < 0 else "marginal"
 
     @property
-    def sentence(self) -> Annotated[str, Quantity(key="verdict_in_words",
-            help="stability, its certainty and the dominant pole")]:  # fmt: skip
+    def sentence(
+        self,
+    ) -> Annotated[
+        str, Quantity(key="verdict_in_words", help="stability, its certainty and the dominant pole")
+    ]:
         """Stability, its certainty, and the dominant pole."""
         return f"{self.word} ({self.holds_for}); dominant pole: {self.slowest}"
 
     @property
-    def slowest(self) -> Annotated[str, Quantity("dominant pole", key="dominant",
-            help="origin of the pole of largest |z|: a mode, the hub or the controller")]:  # fmt: skip
+    def slowest(
+        self,
+    ) -> Annotated[
+        str,
+        Quantity(
+            "dominant pole",
+            key="dominant",
+            help="origin of the pole of largest |z|: a mode, the hub or the controller",
+        ),
+    ]:
         """Origin of the pole of largest radius: a mode, the hub, or a pole of the law."""
         return dominant(self.loop)
 
     @property
-    def holds_for(self) -> Annotated[str, Quantity("certainty", key="certainty",
-            help="frequency range or number of modes for which the verdict was shown")]:  # fmt: skip
+    def holds_for(
+        self,
+    ) -> Annotated[
+        str,
+        Quantity(
+            "certainty",
+            key="certainty",
+            help="frequency range or number of modes for which the verdict was shown",
+        ),
+    ]:
         """The modes for which the verdict is certified."""
         shown = f"{'converged for' if self.is_converged else 'model of'} the first {self.modes_used} modes"
         shown = shown if self.band is None else f"certified up to {self.band.top:.3g} rad/s"
@@ -157,8 +212,16 @@ class Verdict(OfLoop, LoopVerdict):
         return f"{'converged' if self.is_converged else 'approximate'}, first {self.modes_used} modes"
 
     @property
-    def time_constant(self) -> Annotated[float | None, Quantity("dominant time constant", "s",
-            help="time constant of the pole of largest |z|, negative of a growing one")]:  # fmt: skip
+    def time_constant(
+        self,
+    ) -> Annotated[
+        float | None,
+        Quantity(
+            "dominant time constant",
+            "s",
+            help="time constant of the pole of largest |z|, negative of a growing one",
+        ),
+    ]:
         """Time constant of the dominant pole, below 0 where it grows."""
         return -self.loop.chain.sampling.period / self.log_radius if self.log_radius else None
 
@@ -180,17 +243,19 @@ class Verdict(OfLoop, LoopVerdict):
     @cached_property
     def contour(self) -> LoopContour:
         """Around the upper half of the circle, as s = ln(z)/T, and outside the poles on it."""
+        # of ln|z|: an open-loop pole so near to the circle is on it
+        on_circle = 1e-12
         loop = self.full
         poles = self.full.poles
         s = np.log(1 + loop.rig.open_loop[loop.rig.open_loop != -1])
-        is_near = abs(s.real) <= ON_CIRCLE
+        is_near = abs(s.real) <= on_circle
         closed = np.asarray(poles.log_radius + 1j * abs(np.angle(poles.z)), dtype=np.complex128)
         return LoopContour(
             grid=self.frequencies,
             on_curve=np.unique(s.imag[is_near & (s.imag >= 0) & (s.imag < math.pi)]) / loop.period,
             closed=closed / loop.period,
             closing=np.empty(0, complex),
-            unstable_open=int((s.real > ON_CIRCLE).sum()),
+            unstable_open=int((s.real > on_circle).sum()),
             unstable=poles.unstable,
             clear=poles.unstable,
             near_axis=int((poles.log_radius == 0).sum()),
@@ -234,9 +299,15 @@ def sampled_verdict(case: Case, *, count: int | None = None) -> Verdict:
     radius that of the loop with every mode of the band.  Raises ParameterError as `sampled_loop` does, and for a count
     outside 1..400.
     """
+    # and its rounding error
+    radius_noise = 1e-12
+    # modes that may be asked for
+    most_count = 400
     case = admit_case(SAMPLED_LOOP, case)
     if count is not None:
-        count = whole("modes", count, 1, MOST_COUNT, f"a whole number of flexible modes from 1 to {MOST_COUNT}")
+        count = whole(
+            "modes", count, 1, most_count, f"a whole number of flexible modes from 1 to {most_count}"
+        )
         return Verdict(sampled_loop(case, count=count))
     if case.arm.has_elastic_link:
         return Verdict(sampled_loop(case, count=UNDAMPED_MODES))
@@ -247,15 +318,19 @@ def sampled_verdict(case: Case, *, count: int | None = None) -> Verdict:
     radius = full.poles.log_spectral_radius
 
     def agrees(fewer: Sampled) -> bool:
-        is_near = abs(fewer.poles.log_spectral_radius - radius) <= RADIUS_AGREES * abs(radius) + RADIUS_NOISE
-        return is_near and fewer.poles.unstable == full.poles.unstable and proven in (None, fewer.poles.unstable)
+        is_near = abs(fewer.poles.log_spectral_radius - radius) <= RADIUS_AGREES * abs(radius) + radius_noise
+        return (
+            is_near and fewer.poles.unstable == full.poles.unstable and proven in (None, fewer.poles.unstable)
+        )
 
     # 8 modes of the smallest loop, twice as many in each next
     few = min(8, full.plant.count // 2)
     most = full.plant.count
     loops = (with_more_modes(full, few << n) for n in range(most.bit_length()) if 0 < few << n < most)
     loop = next(filter(agrees, loops), full)
-    is_proven = proven is not None and loop.poles.is_determined and (proven == 0) == (loop.poles.unstable == 0)
+    is_proven = (
+        proven is not None and loop.poles.is_determined and (proven == 0) == (loop.poles.unstable == 0)
+    )
     return Verdict(loop, band if is_proven else None, is_converged=loop is not full)
 
 
@@ -264,8 +339,14 @@ class SampledNumber(NamedTuple):
 
     number: Annotated[str, Quantity("gain or coefficient", help="name of a number of the controller")]
     value: Annotated[float, Quantity("value", help="present value of the number")]
-    windows: Annotated[Sequence[Window | FigurePair], Quantity("stability intervals", key="intervals",
-            help="all intervals of the number in which the loop is stable, the others constant")]  # fmt: skip
+    windows: Annotated[
+        Sequence[Window | FigurePair],
+        Quantity(
+            "stability intervals",
+            key="intervals",
+            help="all intervals of the number in which the loop is stable, the others constant",
+        ),
+    ]
     interval: Annotated[Window | None, Quantity(help="the interval that contains the present value")]
 
 
@@ -286,45 +367,96 @@ class Analysis(LoopAnalysis):
         return self.verdict.in_band
 
     @cached_property
-    def stability_intervals(self) -> Annotated[list[SampledNumber], Quantity("stability intervals", first=True,
-            help="stability intervals of each number of the controller, the others constant")]:  # fmt: skip
+    def stability_intervals(
+        self,
+    ) -> Annotated[
+        list[SampledNumber],
+        Quantity(
+            "stability intervals",
+            first=True,
+            help="stability intervals of each number of the controller, the others constant",
+        ),
+    ]:
         """One row for each gain at the hub, or number of another law, the others constant."""
         if not self.loop.is_of_gains:
             values = {name: value for name, value in self.loop.numbers.items() if value}
             found = windows_on_circle(self.loop, [*values]) if values else {}
-            return [SampledNumber(n, values[n], each, interval_around(each, values[n])) for n, each in found.items()]
-        return [SampledNumber(n, self.loop.number(n), each, self.interval(n)) for n, each in self.shown.items()]
+            return [
+                SampledNumber(n, values[n], each, interval_around(each, values[n]))
+                for n, each in found.items()
+            ]
+        return [
+            SampledNumber(n, self.loop.number(n), each, self.interval(n)) for n, each in self.shown.items()
+        ]
 
     @property
-    def delay_margin_samples(self) -> Annotated[float, Quantity(unit="samples", key="delay_margin_samples",
-            help="smallest additional delay that destabilises the loop, in samples")]:  # fmt: skip
+    def delay_margin_samples(
+        self,
+    ) -> Annotated[
+        float,
+        Quantity(
+            unit="samples",
+            key="delay_margin_samples",
+            help="smallest additional delay that destabilises the loop, in samples",
+        ),
+    ]:
         """The further delay in samples, to the last digit."""
         return self.delay_limit.value
 
     @property
-    def delay_margin_seconds(self) -> Annotated[float, Quantity("delay margin", "s", 4, key="delay_margin_s",
-            help="smallest additional loop delay that destabilises the loop; 0 of an unstable loop")]:  # fmt: skip
+    def delay_margin_seconds(
+        self,
+    ) -> Annotated[
+        float,
+        Quantity(
+            "delay margin",
+            "s",
+            4,
+            key="delay_margin_s",
+            help="smallest additional loop delay that destabilises the loop; 0 of an unstable loop",
+        ),
+    ]:
         """The further delay in seconds."""
         seconds = self.delay_limit.value * self.loop.chain.sampling.period
         return LowerBound(seconds) if self.is_lower_bound else seconds
 
     @property
-    def is_lower_bound(self) -> Annotated[bool, Quantity("delay margin: lower bound", key="delay_margin_is_lower_bound",
-            help="whether the search ended at the margin with the loop still stable")]:  # fmt: skip
+    def is_lower_bound(
+        self,
+    ) -> Annotated[
+        bool,
+        Quantity(
+            "delay margin: lower bound",
+            key="delay_margin_is_lower_bound",
+            help="whether the search ended at the margin with the loop still stable",
+        ),
+    ]:
         """Whether no further delay up to the margin destabilises the loop."""
         return self.delay_limit.is_bound
 
     @property
-    def free_hub_angle(self) -> Annotated[str | None, Quantity("free hub angle",
-            help="pole at z = 1 of a hub angle without feedback, which the verdict leaves out")]:  # fmt: skip
+    def free_hub_angle(
+        self,
+    ) -> Annotated[
+        str | None,
+        Quantity(
+            "free hub angle",
+            help="pole at z = 1 of a hub angle without feedback, which the verdict leaves out",
+        ),
+    ]:
         """The pole at z = 1 that the verdict leaves out."""
         return "its pole at z = 1 is left out" if self.loop.has_free_angle else None
 
     @property
-    def unfiltered_signals(self) -> Annotated[list[str], Quantity(
-            help="signals of the controller without an analog anti-alias filter")]:  # fmt: skip
+    def unfiltered_signals(
+        self,
+    ) -> Annotated[list[str], Quantity(help="signals of the controller without an analog anti-alias filter")]:
         """Signals without an anti-alias filter."""
-        return [name for name, analog in zip(self.loop.in_z.signals, self.loop.rig.analog, strict=True) if not analog]
+        return [
+            name
+            for name, analog in zip(self.loop.in_z.signals, self.loop.rig.analog, strict=True)
+            if not analog
+        ]
 
     @property
     def loop(self) -> Sampled:
@@ -336,7 +468,8 @@ class Analysis(LoopAnalysis):
         """The stability intervals of each gain at the hub, the others constant, by name."""
         without_loop = (MOMENT_GAIN,) if self.loop.plant.arm.has_massless_hub else ()
         return {
-            name: [] if name in without_loop else shown_windows(self.loop, self.verdict.band, name) for name in NAMES
+            name: [] if name in without_loop else shown_windows(self.loop, self.verdict.band, name)
+            for name in NAMES
         }
 
     def interval(self, name: str) -> Window | None:
@@ -353,20 +486,37 @@ class Analysis(LoopAnalysis):
         return {name: [(low.value, high.value) for low, high in each] for name, each in self.shown.items()}
 
     @cached_property
-    def modes(self) -> Annotated[ModeTable, Quantity("modes",
-            help="effect of the controller on each mode, in ln|z| per sample")]:  # fmt: skip
+    def modes(
+        self,
+    ) -> Annotated[
+        ModeTable, Quantity("modes", help="effect of the controller on each mode, in ln|z| per sample")
+    ]:
         """The modes one by one."""
         return mode_table(self.loop)
 
     @property
-    def first_unstable_mode(self) -> Annotated[int | None, Quantity("first unstable mode",
-            help="lowest mode whose closed-loop pole lies outside the unit circle")]:  # fmt: skip
+    def first_unstable_mode(
+        self,
+    ) -> Annotated[
+        int | None,
+        Quantity(
+            "first unstable mode", help="lowest mode whose closed-loop pole lies outside the unit circle"
+        ),
+    ]:
         """The lowest unstable mode."""
         return min(self.modes.index[self.modes.log_radius > 0].tolist(), default=None)
 
     @cached_property
-    def delay(self) -> Annotated[Figure, Quantity("delay margin in samples", key="delay_margin",
-            help="smallest additional delay that destabilises the loop, over the sampling period")]:  # fmt: skip
+    def delay(
+        self,
+    ) -> Annotated[
+        Figure,
+        Quantity(
+            "delay margin in samples",
+            key="delay_margin",
+            help="smallest additional delay that destabilises the loop, over the sampling period",
+        ),
+    ]:
         """The delay margin [samples]; of any law but gains at the hub with the modes of the verdict."""
         return self.delay_limit.figure
 
@@ -385,8 +535,16 @@ class Analysis(LoopAnalysis):
         return DelayMargin(self.delay_limit.value, self.is_lower_bound)
 
     @cached_property
-    def minimum_damping(self) -> Annotated[Figure | None, Quantity("minimum structural damping for stability", "s",
-            help="Kelvin-Voigt damping C of the link from which on the loop is stable")]:  # fmt: skip
+    def minimum_damping(
+        self,
+    ) -> Annotated[
+        Figure | None,
+        Quantity(
+            "minimum structural damping for stability",
+            "s",
+            help="Kelvin-Voigt damping C of the link from which on the loop is stable",
+        ),
+    ]:
         """The damping C [s] from which on the loop is stable, for gains at the hub."""
         return None if self.damping_limit is None else self.damping_limit.figure
 
@@ -402,20 +560,38 @@ class Analysis(LoopAnalysis):
         return [stable_windows(self.loop.with_delay(each), FACTOR) for each in late.tolist()]
 
     @property
-    def stable_gain_factors(self) -> Annotated[list[Window] | None, Quantity("stable factors on the controller",
-            help="all intervals of a factor on the whole controller in which the loop is stable")]:  # fmt: skip
+    def stable_gain_factors(
+        self,
+    ) -> Annotated[
+        list[Window] | None,
+        Quantity(
+            "stable factors on the controller",
+            help="all intervals of a factor on the whole controller in which the loop is stable",
+        ),
+    ]:
         """All intervals, of a controller that is more than gains at the hub."""
         return None if self.loop.is_of_gains else self.verdict.factors
 
     @property
-    def gain_factors(self) -> Annotated[Window | None, Quantity("gain margin, factors down and up",
-            help="interval around 1 of a factor on the whole controller in which the loop is stable")]:  # fmt: skip
+    def gain_factors(
+        self,
+    ) -> Annotated[
+        Window | None,
+        Quantity(
+            "gain margin, factors down and up",
+            help="interval around 1 of a factor on the whole controller in which the loop is stable",
+        ),
+    ]:
         """The stability interval around 1 of a factor on the law; None unless the loop is stable."""
         return interval_around(self.verdict.factors, 1.0)
 
     @property
-    def warnings(self) -> Annotated[tuple[str, ...], Quantity("warnings",
-            help="unstable poles of the controller that its own zeros cancel")]:  # fmt: skip
+    def warnings(
+        self,
+    ) -> Annotated[
+        tuple[str, ...],
+        Quantity("warnings", help="unstable poles of the controller that its own zeros cancel"),
+    ]:
         """Unstable poles of the law that its own zeros cancel."""
         return self.loop.warnings
 
@@ -440,13 +616,19 @@ class SampledBrief:
     period: Annotated[float, Quantity(unit="s", help="sampling period of the controller")]
     delay_samples: Annotated[float, Quantity(help="delay of the loop in samples")]
     period_from: str
-    is_stable: Annotated[bool | None, Quantity(key="stable", help="whether every pole lies inside the unit circle")]
-    spectral_radius: Annotated[float | None, Quantity("spectral radius",
-            help="largest |z| of the closed-loop poles; below 1 of a stable loop")]  # fmt: skip
+    is_stable: Annotated[
+        bool | None, Quantity(key="stable", help="whether every pole lies inside the unit circle")
+    ]
+    spectral_radius: Annotated[
+        float | None,
+        Quantity("spectral radius", help="largest |z| of the closed-loop poles; below 1 of a stable loop"),
+    ]
     words: Annotated[str, Quantity("sampled loop", key="in_words", help="verdict at the sampling period")]
 
     @property
-    def period_is_default(self) -> Annotated[bool, Quantity(help="whether the sampling period is tfarm's own")]:
+    def period_is_default(
+        self,
+    ) -> Annotated[bool, Quantity(help="whether the sampling period is tfarm's own")]:
         """Whether it is tfarm's: neither of the law, nor of a file or an option."""
         return self.period_from == DEFAULT_PERIOD
 
@@ -467,10 +649,11 @@ def sampled_brief(case: Case) -> SampledBrief:
 
 def brief_of(found: Verdict | ConvergenceError, case: Case) -> SampledBrief:
     """A verdict on a case in short, or the reason that there is none; in capitals where the loop is not stable."""
+    laws_period = "the controller's period"
     T = case.chain.sampling.period
     delay = case.chain.sampling.delay_samples
     origin = case.chain.period_from or (DEFAULT_PERIOD if Sampling().period == T else "")
-    origin = LAWS_PERIOD if case.law.is_discrete else origin
+    origin = laws_period if case.law.is_discrete else origin
     verdict = None if isinstance(found, ConvergenceError) else found
     word, _, rest = (f"undecided: {found}" if verdict is None else verdict.sentence).partition(" ")
     is_stable = None if verdict is None else verdict.is_stable

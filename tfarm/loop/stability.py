@@ -33,32 +33,40 @@ from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real
 from tfarm.case import Case
 from tfarm.errors import ConvergenceError, ParameterError, require
+from tfarm.loop.continuous import (
+    MOST_BAND_MODES,
+    QUIET_REACH,
+    ContinuousLoop,
+    frequency_above_mode,
+    grid,
+    quiet_places,
+)
+from tfarm.loop.curve import LoopContour, LoopVerdict, next_limits
+from tfarm.loop.loop_margins import PhaseCrossover
+from tfarm.loop.poles import (
+    HUB,
+    Poles,
+    box_of,
+    count_with_mirrors,
+    poles_below,
+    poles_by_mode,
+    poles_of_model,
+)
+from tfarm.loop.theorem import GIVES, TAKES
 from tfarm.records import frozen
 from tfarm.reduced.modal import modal_model, sensed_model
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import Quantity
 from tfarm.spectrum import flexible_frequencies, modes, modes_below
 
-from .continuous import MOST_BAND_MODES, QUIET_REACH, ContinuousLoop, frequency_above_mode, grid, quiet_places
-from .curve import LoopContour, LoopVerdict, next_limits
-from .loop_margins import PhaseCrossover
-from .poles import HUB, Poles, box_of, count_with_mirrors, poles_below, poles_by_mode, poles_of_model
-from .theorem import GIVES, TAKES
-
-LEAST_BAND_MODES = 12  # flexible modes in the band at C = 0, and at least
-QUIET = 0.5  # |L| beyond the band, with damping
-QUIET_POINTS = 1200  # up to QUIET_REACH, 600 a decade; a quarter of that number on the upper edge of the box
-WIDENED = 1.6  # times, from one band that is tried to the next
-MARGIN_OF_ZERO = 1e-11  # a real part below this share of |s| is none: poles have an error of a few eps
-LISTED_LEFT = 0.5  # of 1/delay: poles are listed up to there on the left; further left are more and more, all stable
-BEYOND_LAW_POLES = 1.3  # of the fastest pole of the law that rings: a band reaches so far, if it can
-DULL = 0.7  # damping ratio from which on a pole of the law makes no peak
-NEAREST_TO_AXIS = 1e-4  # of a band: first distance from the axis at which L is evaluated on the upper edge of the box
-UNCONTROLLABLE = 1e-9  # a hub participation below this share of an ordinary one is none
-MOST_SPILL_MODES = 60  # modes of a model
-USUAL_SPILL_MODES = 20  # of the largest model by default
-REST_SHARE = 1e-7  # of w1: poles at 0 come out as small
-UNDAMPED_SHARE = 1e-9  # of its size: largest real part of a pole that no model damps
+# |L| beyond the band, with damping
+QUIET = 0.5
+# a real part below this share of |s| is none: poles have an error of a few eps
+MARGIN_OF_ZERO = 1e-11
+# of the largest model by default
+USUAL_SPILL_MODES = 20
+# of its size: largest real part of a pole that no model damps
+UNDAMPED_SHARE = 1e-9
 
 
 CONTINUOUS = Consumer(
@@ -66,18 +74,32 @@ CONTINUOUS = Consumer(
     acts=("law", "hold", "hub damping", "plant"),
     named=("torque limit",),
     none=(
-        "reference", "anti-alias filter", "encoder", "hub rate", "amplifier steps", "amplifier range", "arithmetic",
-        "DAC steps", "DAC range", "delay", "volts",
+        "reference",
+        "anti-alias filter",
+        "encoder",
+        "hub rate",
+        "amplifier steps",
+        "amplifier range",
+        "arithmetic",
+        "DAC steps",
+        "DAC range",
+        "delay",
+        "volts",
     ),
-)  # fmt: skip
+)
 FIRST_MODE = Quantity("lowest destabilised mode", help="of the exact loop; 0: a pole below the first mode")
-SHOWN_FROM = Quantity("design models unstable from (modes)", key="shown_from_modes", help="as are all larger ones")
+SHOWN_FROM = Quantity(
+    "design models unstable from (modes)", key="shown_from_modes", help="as are all larger ones"
+)
 DELAYED = "a delay without any damping destabilises infinitely many modes"
 SMALL_GAIN = f"|L(iw)| < {QUIET:g} and falling: no unstable pole (small gain)"
-UNKNOWN_ABOVE = "converged up to {band:.4g} rad/s, not determined beyond, neither by small gain nor by a theorem"
-BAND = Quantity("frequency range, up to", "rad/s", key="up_to_rad_s", help="poles below it are counted completely")
+BAND = Quantity(
+    "frequency range, up to", "rad/s", key="up_to_rad_s", help="poles below it are counted completely"
+)
 KNOWN_BEYOND = Quantity(
-    "stability known beyond the range", key="known_beyond", help="no: the verdict is that of the frequency range alone"
+    "stability known beyond the range",
+    key="known_beyond",
+    help="no: the verdict is that of the frequency range alone",
 )
 
 
@@ -90,24 +112,35 @@ class Stability(LoopVerdict):
 
     loop: Annotated[ContinuousLoop, Quantity(flat=True)]
     word: Annotated[
-        str, Quantity("stability", key="verdict", help="stable, marginal or unstable; the pole of a free hub left out")
+        str,
+        Quantity(
+            "stability", key="verdict", help="stable, marginal or unstable; the pole of a free hub left out"
+        ),
     ]
     unstable_roots: Annotated[int, Quantity("unstable poles", help="in the frequency range")]
-    unstable_roots_infinite: Annotated[bool, Quantity(help="infinitely many poles beyond the range are unstable")]
+    unstable_roots_infinite: Annotated[
+        bool, Quantity(help="infinitely many poles beyond the range are unstable")
+    ]
     band: Annotated[float, BAND]
-    tail: Annotated[str, Quantity("beyond the range", key="beyond", help="what decides the poles of higher frequency")]
+    tail: Annotated[
+        str, Quantity("beyond the range", key="beyond", help="what decides the poles of higher frequency")
+    ]
     poles: Poles
     is_known_beyond: Annotated[bool, KNOWN_BEYOND] = True
 
     consumer = CONTINUOUS
 
     @property
-    def spectral_abscissa(self) -> Annotated[float, Quantity("spectral abscissa", "1/s", 6, "largest Re s in range")]:
+    def spectral_abscissa(
+        self,
+    ) -> Annotated[float, Quantity("spectral abscissa", "1/s", 6, "largest Re s in range")]:
         """The largest real part [1/s] of the poles in range, apart from those at 0."""
         return self.poles.spectral_abscissa
 
     @property
-    def free_pole(self) -> Annotated[str | None, Quantity("free hub angle", help="pole at 0 that verdicts leave out")]:
+    def free_pole(
+        self,
+    ) -> Annotated[str | None, Quantity("free hub angle", help="pole at 0 that verdicts leave out")]:
         """The pole at 0 that the verdict leaves out."""
         return "its pole at s = 0 is left out" if self.poles.moving.size < self.poles.values.size else None
 
@@ -130,7 +163,13 @@ class Stability(LoopVerdict):
     @property
     def range_words(self) -> str:
         """The range in which poles are counted, and what is known beyond."""
-        known = ", small gain beyond" if self.tail == SMALL_GAIN else ", theorem beyond" if self.is_known_beyond else ""
+        known = (
+            ", small gain beyond"
+            if self.tail == SMALL_GAIN
+            else ", theorem beyond"
+            if self.is_known_beyond
+            else ""
+        )
         return f"converged to {self.band:.4g} rad/s{known}"
 
     @property
@@ -204,7 +243,9 @@ class Stability(LoopVerdict):
         arm = self.loop.arm
         numbers = self.loop.numbers
         ends = (arm.input_per_torque, numbers[MOMENT_GAIN]), (-arm.rate_loss, numbers[RATE_GAIN])
-        return next_limits([*(t for w, t in by_phase if w == 0), *(end / gain for end, gain in ends if end and gain)])
+        return next_limits(
+            [*(t for w, t in by_phase if w == 0), *(end / gain for end, gain in ends if end and gain)]
+        )
 
 
 def poles_on_axis(loop: ContinuousLoop, band: float) -> Real:
@@ -212,7 +253,8 @@ def poles_on_axis(loop: ContinuousLoop, band: float) -> Real:
     arm = loop.arm
     flexible = np.asarray(flexible_frequencies(arm, band)) if arm.is_undamped else np.empty(0)
     own = loop.law.poles
-    on_axis = abs(own.real) <= AXIS_SHARE * abs(own)  # of a product of resonators roots are off it by rounding
+    # of a product of resonators roots are off it by rounding
+    on_axis = abs(own.real) <= AXIS_SHARE * abs(own)
     ringing = own.imag[on_axis & (own.imag > 0) & (own.imag < band)]
     integrators = loop.k.at_rest + int((own == 0).sum())
     return np.unique(np.r_[[0.0] * (integrators > loop.zeros_at_origin), flexible, ringing])
@@ -229,14 +271,19 @@ def stability(case: Case, band: float | None = None) -> Stability:
 
 def verdict_on(loop: ContinuousLoop, band: float | None = None) -> Stability:
     """Return the verdict on a loop, as `stability`."""
+    # of 1/delay: poles are listed up to there on the left; further left are more and more, all stable
+    listed_left = 0.5
+    unknown_above = (
+        "converged up to {band:.4g} rad/s, not determined beyond, neither by small gain nor by a theorem"
+    )
     theorem = loop.theorem
     height, quiet = (band, False) if band is not None else band_of_loop(loop)
-    poles = poles_below(loop, height, LISTED_LEFT)
+    poles = poles_below(loop, height, listed_left)
     delayed = DELAYED if loop.arm.is_undamped and loop.law.delay and loop.feeds_back else ""
     tail = theorem.reason if theorem.energy is not None else SMALL_GAIN if quiet else delayed
     is_infinite = theorem.energy == GIVES or tail == DELAYED
     verdict = _verdict(poles, is_infinite)
-    words = tail or UNKNOWN_ABOVE.format(band=height)
+    words = tail or unknown_above.format(band=height)
     return Stability(loop, verdict, poles.unstable, is_infinite, poles.box.im_max, words, poles, bool(tail))
 
 
@@ -257,7 +304,9 @@ def _verdict(poles: Poles, is_infinite: bool) -> str:
         known = poles.loop.theorem.energy == TAKES or not on_axis.size
         return "stable" if known and is_controllable(arm.lossless_hub, poles.box.im_max) else "marginal"
     if on_axis.size:
-        text = f"the pole at {on_axis[0]:.6g} 1/s is on the imaginary axis to working precision: not determined"
+        text = (
+            f"the pole at {on_axis[0]:.6g} 1/s is on the imaginary axis to working precision: not determined"
+        )
         raise ConvergenceError(text, complex(on_axis[0]), float(on_axis[0].real))
     return "stable"
 
@@ -267,7 +316,9 @@ def is_controllable(arm: Arm, up_to: float) -> bool:
 
     At C = 0 a mode without the hub stays undamped under any law: exceptional arms have one.
     """
-    return modes_below(arm, up_to) == 0 or bool((hub_shares(arm, up_to).max(axis=0) > UNCONTROLLABLE).all())
+    # a hub participation below this share of an ordinary one is none
+    uncontrollable = 1e-9
+    return modes_below(arm, up_to) == 0 or bool((hub_shares(arm, up_to).max(axis=0) > uncontrollable).all())
 
 
 def hub_shares(arm: Arm, up_to: float) -> Real:
@@ -288,13 +339,21 @@ def hub_shares(arm: Arm, up_to: float) -> Real:
 
 def band_of_loop(loop: ContinuousLoop) -> tuple[float, bool]:
     """The band [rad/s] in which poles are computed, and whether small gain holds beyond it (never without damping)."""
+    # flexible modes in the band at C = 0, and at least
+    least_band_modes = 12
+    # times, from one band that is tried to the next
+    widened = 1.6
+    # of the fastest pole of the law that rings: a band reaches so far, if it can
+    beyond_law_poles = 1.3
+    # damping ratio from which on a pole of the law makes no peak
+    dull = 0.7
     theorem = loop.theorem
     arm = loop.arm
     own = loop.law.poles
-    ringing = own[own.real > -DULL * abs(own)]
-    fastest = BEYOND_LAW_POLES * float(abs(ringing).max(initial=0.0))
+    ringing = own[own.real > -dull * abs(own)]
+    fastest = beyond_law_poles * float(abs(ringing).max(initial=0.0))
     highest = frequency_above_mode(arm, MOST_BAND_MODES)
-    least = max(frequency_above_mode(arm, LEAST_BAND_MODES), min(fastest, highest))
+    least = max(frequency_above_mode(arm, least_band_modes), min(fastest, highest))
     is_decided = theorem.energy is not None and (arm.has_elastic_link or not loop.law.is_static)
     if arm.loses_at_hub_alone or is_decided or fastest > highest:
         return least, False
@@ -302,8 +361,8 @@ def band_of_loop(loop: ContinuousLoop) -> tuple[float, bool]:
     while band <= highest or modes_below(arm, band) <= MOST_BAND_MODES:
         if has_fallen(loop, band):
             return band, arm.least_damping > 0
-        band *= WIDENED
-    return max(least, band / WIDENED) if loop.law.is_static else least, False
+        band *= widened
+    return max(least, band / widened) if loop.law.is_static else least, False
 
 
 def band_of_family(loops: Iterable[ContinuousLoop]) -> tuple[float, bool]:
@@ -327,13 +386,17 @@ def has_fallen(loop: ContinuousLoop, band: float) -> bool:
     L is evaluated on two decades of the axis, where |L| falls, with the natural frequencies between, and on the upper
     edge of the box; farther right |L| is smaller still.
     """
-    omega = np.asarray(quiet_places(loop.arm, band, QUIET_POINTS))
+    # up to QUIET_REACH, 600 a decade; a quarter of that number on the upper edge of the box
+    quiet_points = 1200
+    # of a band: first distance from the axis at which L is evaluated on the upper edge of the box
+    nearest_to_axis = 1e-4
+    omega = np.asarray(quiet_places(loop.arm, band, quiet_points))
     half = math.sqrt(QUIET_REACH) * band
     size = abs(loop.loop_function(1j * omega))
     if not (size.max() < QUIET and size[omega > half].max() <= size[omega <= half].max()):
         return False
     right = box_of(loop, band).re_max
-    edge = np.r_[0.0, np.geomspace(NEAREST_TO_AXIS * band, right, QUIET_POINTS // 4)] + 1j * band
+    edge = np.r_[0.0, np.geomspace(nearest_to_axis * band, right, quiet_points // 4)] + 1j * band
     return bool(abs(loop.loop_function(edge)).max() < QUIET)
 
 
@@ -399,7 +462,9 @@ class Spill:
         return int(beyond[0]) if beyond.size else None
 
     @property
-    def models(self) -> Annotated[list[SpillModel], Quantity("design models", help="bare modes, without remainder")]:
+    def models(
+        self,
+    ) -> Annotated[list[SpillModel], Quantity("design models", help="bare modes, without remainder")]:
         """One row for each model."""
         poles = (complex(s.real, abs(s.imag)) for s in self.rightmost)
         return list(map(SpillModel, self.modes.tolist(), self.unstable.tolist(), poles))
@@ -410,7 +475,9 @@ class Spill:
         return self.modes[self.unstable == 0]
 
     @property
-    def in_words(self) -> Annotated[str, Quantity("spillover", help="exact loop, compared with the design models")]:
+    def in_words(
+        self,
+    ) -> Annotated[str, Quantity("spillover", help="exact loop, compared with the design models")]:
         """The exact loop, and the models that are stable where it is not."""
         if not self.driven.size:
             where = "" if self.verdict.is_known_beyond else " in the frequency range"
@@ -426,7 +493,9 @@ class Spill:
             models = f"the model of {first} mode{'s' * (first > 1)} is"
         elif last - first + 1 != count:
             models = f"{count} of the models up to {last} modes are"
-        end = f"those from {self.shown_from} modes on are not" if self.shown_from else "the largest among them"
+        end = (
+            f"those from {self.shown_from} modes on are not" if self.shown_from else "the largest among them"
+        )
         return f"{words}; {models} stable, {end}"
 
 
@@ -437,15 +506,24 @@ def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
     Raises ParameterError for an invalid law, where there is no loop, or none of finite order; ConvergenceError as
     `stability` does.
     """
+    # modes of a model
+    most_spill_modes = 60
+    # of w1: poles at 0 come out as small
+    rest_share = 1e-7
     case = Case(arm, law)
-    most = whole("modes", most, 1, MOST_SPILL_MODES, f"a whole number of modes, 1 to {MOST_SPILL_MODES}")
-    require(not case.law.is_improper, "law", case.law.name, "differentiates, and has no states; add a fast pole to den")
+    most = whole("modes", most, 1, most_spill_modes, f"a whole number of modes, 1 to {most_spill_modes}")
+    require(
+        not case.law.is_improper,
+        "law",
+        case.law.name,
+        "differentiates, and has no states; add a fast pole to den",
+    )
     verdict = stability(case)
     loop = verdict.loop
     numbers = np.arange(1, most + 1)
     unstable = []
     rightmost = []
-    slowest = REST_SHARE * float(modes(loop.arm, 1).natural_frequency[-1])
+    slowest = rest_share * float(modes(loop.arm, 1).natural_frequency[-1])
     for model in _bare_models(loop, most):
         poles = poles_of_model(loop, model)
         moving = poles[abs(poles) > slowest]

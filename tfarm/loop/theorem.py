@@ -52,9 +52,9 @@ from tfarm.response import transfer
 from tfarm.schema import Quantity
 
 if TYPE_CHECKING:
-    Poly = Any  # of sympy, over the rationals: it comes without types, and is imported where it is used
+    # of sympy, over the rationals: it comes without types, and is imported where it is used
+    Poly = Any
 
-MOST_EXACT_DEGREE = 40  # degree: exact arithmetic with such polynomials takes a moment
 KIND = Quantity("kind", help="from the hub's angle or rate to its torque; none where no sign is shown")
 # energy that a law takes from every mode with motion of the hub: its sign
 TAKES = 1
@@ -84,10 +84,6 @@ class Theorem(NamedTuple):
 
 
 NO_THEOREM = Theorem(None, "")
-HELD = "modes with the hub at rest stay undamped at all frequencies: the whole moment on the hub is fed back"
-CONSERVED = "C = 0 and energy is conserved: modes beyond lie on the axis"
-DAMPED = "C = 0: every mode beyond is damped (Lyapunov), with a decay rate that tends to 0"
-DRIVEN = "C = 0: every flexible mode beyond is unstable too, with a growth rate that tends to 0"
 
 
 def cancel_hub_moment(loop: Loop) -> tuple[float, Law] | None:
@@ -116,23 +112,29 @@ def cancel_hub_moment(loop: Loop) -> tuple[float, Law] | None:
 
 def theorem_of(loop: Loop) -> Theorem:
     """Return the theorem that decides the stability of every mode of a loop."""
+    held = (
+        "modes with the hub at rest stay undamped at all frequencies: the whole moment on the hub is fed back"
+    )
+    conserved = "C = 0 and energy is conserved: modes beyond lie on the axis"
+    damped = "C = 0: every mode beyond is damped (Lyapunov), with a decay rate that tends to 0"
+    driven = "C = 0: every flexible mode beyond is unstable too, with a growth rate that tends to 0"
     arm = loop.arm
     parts = cancel_hub_moment(loop)
     if parts is None or (arm.input_lags and loop.feeds_back):
         return NO_THEOREM
     share, rest = parts
     if share == 1.0:
-        return Theorem(CONSERVES, HELD)
+        return Theorem(CONSERVES, held)
     way = 1.0 if share < 1.0 else -1.0
     signs = signs_of(rest.times(way), way * arm.rate_loss)
     if signs.energy is not None:
         is_plain = arm.has_elastic_link and loop.law.is_static
         words = f"{signs.reason}: no mode is unstable at any frequency"
-        return Theorem(signs.energy, (DAMPED if signs.energy else CONSERVED) if is_plain else words)
+        return Theorem(signs.energy, (damped if signs.energy else conserved) if is_plain else words)
     if arm.has_elastic_link and arm.loses_at_hub_alone:
         opposite = signs_of(rest.times(-way), -way * arm.rate_loss)
         if opposite.energy == TAKES:
-            return Theorem(GIVES, DRIVEN)
+            return Theorem(GIVES, driven)
     return NO_THEOREM
 
 
@@ -145,6 +147,8 @@ def signs_of_loop(loop: Loop) -> Signs:
 
 def signs_of(law: Law, friction: float = 0.0) -> Signs:
     """Return the sign of a law, the hub's friction [input per rad/s] included."""
+    # degree: exact arithmetic with such polynomials takes a moment
+    most_exact_degree = 40
     obstacles = {
         "a delay turns the phase with frequency": law.delay,
         "it is not a law in s on the hub's own angle or rate alone": law.is_discrete
@@ -152,18 +156,20 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
         "the sign of matrices is not determined: give transfer functions": not all(
             isinstance(part.block, Rational) for part in law.parts
         ),
-        f"the sign of more than {MOST_EXACT_DEGREE} states is not determined": law.order > MOST_EXACT_DEGREE,
+        f"the sign of more than {most_exact_degree} states is not determined": law.order > most_exact_degree,
     }
     if reason := next((text for text, holds in obstacles.items() if holds), ""):
         return Signs("", reason)
-    if law.is_static:  # gains on hub angle and hub rate, by their signs alone
+    # gains on hub angle and hub rate, by their signs alone
+    if law.is_static:
         values = dict(zip(law.signals, law.values(np.ones(1, complex))[:, 0].real.tolist(), strict=True))
         return _of_signs(values.get("hub_rate", 0.0) + friction, values.get("hub_angle", 0.0))
     # of the whole law as one fraction on the angle
     num = exact_polynomial([0.0])
     den = exact_polynomial([1.0])
     for part in law.parts:
-        assert isinstance(part.block, Rational)  # seen above
+        # seen above
+        assert isinstance(part.block, Rational)
         p = exact_polynomial(part.block.num) * -law.sign
         q = exact_polynomial(part.block.den)
         if part.signals == ("hub_rate",):
@@ -204,7 +210,8 @@ def _positive_real(num: Poly, den: Poly) -> Signs | None:
         return None
     if num.degree() > den.degree() + 2 or (num.degree() == den.degree() + 2 and num.LC() / den.LC() < 0):
         return None
-    sign = definite(on_axis(num, den)[1])  # Re C(i w)/(i w) = Im C(i w)/w
+    # Re C(i w)/(i w) = Im C(i w)/w
+    sign = definite(on_axis(num, den)[1])
     if not sign or (at_rest < 0 and sign != "above"):
         return None
     return _of_signs(float(sign == "above"), float(at_rest))
@@ -222,7 +229,9 @@ class Lyapunov:
     the law is "unproven", which alone does not make it unstable.  `reason` is one sentence.
     """
 
-    proven: Annotated[bool, Quantity("stability proven", help="no pole in the right half-plane, as V never grows")]
+    proven: Annotated[
+        bool, Quantity("stability proven", help="no pole in the right half-plane, as V never grows")
+    ]
     a1_over_a2: Annotated[float | None, Quantity("weights a1/a2", help="1 - K2, of the energies in V")]
     kind: Literal["dissipated", "conserved", "unproven"]
     reason: Annotated[str, Quantity("reason", help="sign of V_t, or the term of V or V_t that has no sign")]
@@ -239,7 +248,8 @@ def lyapunov(loop: Loop) -> Lyapunov:
     C = arm.damping
     weight = 1.0 - law.K2 / arm.input_per_torque
     K1 = law.K1 + arm.rate_loss
-    least = 0.0  # of Kp: below 0 where the tip is held, and gives the hub a static stiffness
+    # of Kp: below 0 where the tip is held, and gives the hub a static stiffness
+    least = 0.0
     if law.Kp < 0 and not arm.has_rigid_mode:
         least = -weight / float(transfer(arm, "hub_angle").static)
     obstacles = {
@@ -287,7 +297,9 @@ def _split(poly: Poly) -> tuple[Poly, Poly]:
     """p(i w) = a(v) + i w b(v), v = w^2."""
     ascending = poly.all_coeffs()[::-1]
     even, odd = ([(-1) ** n * each for n, each in enumerate(ascending[k::2])][::-1] or [0] for k in (0, 1))
-    return poly.from_list(even, *poly.gens, domain=poly.domain), poly.from_list(odd, *poly.gens, domain=poly.domain)
+    return poly.from_list(even, *poly.gens, domain=poly.domain), poly.from_list(
+        odd, *poly.gens, domain=poly.domain
+    )
 
 
 def definite(poly: Poly) -> Literal["above", "not below", "zero", ""]:

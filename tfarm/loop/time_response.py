@@ -34,35 +34,23 @@ from scipy.sparse.csgraph import connected_components
 from tfarm.arm.law import of_common_blocks
 from tfarm.arrays import LEAST_SIZE, MACHINE_EPS, Complex, Real
 from tfarm.errors import require
+from tfarm.loop.continuous import FAR_RIGHT, ContinuousLoop, frequency_above_mode
+from tfarm.loop.inversion import POINTS, Inversion, invert_transform
+from tfarm.loop.poles import Poles, poles_below
 from tfarm.records import frozen
 from tfarm.response.signals import Signals
 from tfarm.spectrum.table import first_frequency
 
-from .continuous import FAR_RIGHT, ContinuousLoop, frequency_above_mode
-from .inversion import POINTS, Inversion, invert_transform
-from .poles import Poles, poles_below
-
 # the input of the arm as a place of excitation, and as a signal
 ACTUATOR = "actuator"
 TORQUE = "torque"
-USUAL_COUNT = 80  # flexible modes below the top of the box
+# flexible modes below the top of the box
+USUAL_COUNT = 80
 # poles closer than 3/T are one circle, but no farther apart than 0.1 of the first mode
-CLOSE = 3.0
-MOST_CLOSE = 0.1
-SLOW_RADIUS = 2.0  # over T, of a circle around s = 0, on which e^{s T} is moderate; or times the extent of its poles
-POLE_RADIUS = 0.25  # of the way to the next pole: radius of the circle of one pole
 # of circles; e^-40 is below the rounding
-POLE_NODES = 32
-FEWEST_NODES = 128
-MOST_NODES = 512
-NODE_LOG = 40.0
-ON_AXIS = 1e-9  # of the least distance of two circles: by so little a centre is off the real axis
-BLOCK = 20_000  # times that are evaluated together: with 200 terms 64 MB
-MOST_GROWTH = 500.0  # exponent of the fastest growing pole at the end of a record
+# times that are evaluated together: with 200 terms 64 MB
+BLOCK = 20_000
 # of intervals; of a peak: less is rounding; of a record: the same time
-CUTS = 8
-SEEN = 1e-13
-SAME_TIME = 1e-10
 
 Transform = Callable[[Complex], Complex]
 
@@ -125,7 +113,9 @@ class DelayedResponse:
     def early(self, t: Real) -> Real:
         """Return h by the inversions."""
         first, last = self.rests
-        return np.asarray(_summed(self.direct, t) + np.where(t < first.end, first.values_at(t), last.values_at(t)))
+        return np.asarray(
+            _summed(self.direct, t) + np.where(t < first.end, first.values_at(t), last.values_at(t))
+        )
 
     def errors(self, t: Real) -> Real:
         """Return the bound on the error of h."""
@@ -183,16 +173,22 @@ class TimeResponse:
         The bound of a peak includes what they may hold, and the rounding of its value, 2.2e-16 of its size.  `most` is
         infinite of an impulse.
         """
+        # of intervals; of a peak: less is rounding; of a record: the same time
+        cuts = 8
+        seen = 1e-13
+        same_time = 1e-10
         jumps = self.starts[self.starts <= t[-1]]
-        t = np.union1d(t[abs(t[:, None] - jumps).min(axis=1, initial=math.inf) > SAME_TIME * t[-1]], jumps)
-        t = t[np.diff(t, append=math.inf) > SAME_TIME * t[-1]]
+        t = np.union1d(t[abs(t[:, None] - jumps).min(axis=1, initial=math.inf) > same_time * t[-1]], jumps)
+        t = t[np.diff(t, append=math.inf) > same_time * t[-1]]
         after = self.at(t)
         before = after.copy()
         at_jump = np.isin(t, jumps)
         before[:, at_jump] = self.at(t[at_jump], before=True)
         ends = np.array([t[:-1], t[1:]])
         y = np.array([after[:, :-1], before[:, 1:]])
-        bends = np.where(np.isin(t[1:-1], jumps), 0, abs(np.diff((y[1] - y[0]) / np.diff(t))) * 2 / (t[2:] - t[:-2]))
+        bends = np.where(
+            np.isin(t[1:-1], jumps), 0, abs(np.diff((y[1] - y[0]) / np.diff(t))) * 2 / (t[2:] - t[:-2])
+        )
         more = _of_both(bends) * np.diff(t) ** 2 / 4
         errors = self.remainder(t)
         errors = np.maximum(errors[:, :-1], errors[:, 1:])
@@ -201,26 +197,29 @@ class TimeResponse:
         values = [np.hstack([*y])]
         for most_open in (*[3000] * 8, 0):
             largest = abs(np.hstack(values)).max(axis=1, keepdims=True) + LEAST_SIZE
-            could = abs(y).max(axis=0) + np.where(more > SEEN * largest, more, 0.0)
-            excess = np.where((could > largest) & (more > SEEN * largest), could / largest, 0.0).max(axis=0)
+            could = abs(y).max(axis=0) + np.where(more > seen * largest, more, 0.0)
+            excess = np.where((could > largest) & (more > seen * largest), could / largest, 0.0).max(axis=0)
             is_open = np.argsort(-excess)[: min(most_open, np.count_nonzero(excess))]
             most = np.maximum(most, np.delete(could + errors, is_open, axis=1).max(axis=1, initial=0.0))
-            every = np.linspace(ends[0, is_open], ends[1, is_open], CUTS + 1)
+            every = np.linspace(ends[0, is_open], ends[1, is_open], cuts + 1)
             inner = self.at(every[1:-1].ravel())
             times = [*times, every[1:-1].ravel()]
             values = [*values, inner]
-            whole = np.stack([y[0][:, is_open], *np.split(inner, CUTS - 1, axis=1), y[1][:, is_open]], axis=1)
+            whole = np.stack([y[0][:, is_open], *np.split(inner, cuts - 1, axis=1), y[1][:, is_open]], axis=1)
             more = np.hstack([*_of_both(abs(np.diff(whole, 2, axis=1))).swapaxes(0, 1)]) / 4
             y = np.array([np.hstack([*part.swapaxes(0, 1)]) for part in (whole[:, :-1], whole[:, 1:])])
             ends = np.array([every[:-1].ravel(), every[1:].ravel()])
-            errors = np.tile(errors[:, is_open], CUTS)
+            errors = np.tile(errors[:, is_open], cuts)
         t = np.concatenate(times)
         y = np.hstack(values)
         largest = (1 - 1e-14) * abs(y).max(axis=1, keepdims=True)
-        places = np.where(abs(y) >= largest, t, math.inf).argmin(axis=1)  # the first time of a constant
+        # the first time of a constant
+        places = np.where(abs(y) >= largest, t, math.inf).argmin(axis=1)
         found = np.array([t[places], y[:, places].diagonal(), self.remainder(t[places]).diagonal(), most])
         found[2] = np.max([found[2], most - abs(found[1]), MACHINE_EPS * abs(found[1])], axis=0)
-        found[3] = abs(found[1]) + found[2] + sum(np.where(np.isinf(part.off), math.inf, 0.0) for part in self.parts)
+        found[3] = (
+            abs(found[1]) + found[2] + sum(np.where(np.isinf(part.off), math.inf, 0.0) for part in self.parts)
+        )
         return {name: Peak(*each) for name, each in zip(self.names, found.T.tolist(), strict=True)}
 
     def near_starts(self, end: float) -> Real:
@@ -244,16 +243,22 @@ def usual_poles(loop: ContinuousLoop, count: int = USUAL_COUNT) -> Poles:
     return replace(poles_below(seen, frequency_above_mode(loop.arm, count)), loop=loop)
 
 
-def time_response(poles: Poles, names: tuple[str, ...], excitation: Excitation, duration: float) -> TimeResponse:
+def time_response(
+    poles: Poles, names: tuple[str, ...], excitation: Excitation, duration: float
+) -> TimeResponse:
     """Return the signals of these names and "torque" over `duration` [s] from the poles of the loop.
 
     Raises ParameterError for a loop that grows beyond a double.
     """
+    # exponent of the fastest growing pole at the end of a record
+    most_growth = 500.0
     growth = float(poles.values.real.max(initial=0.0)) * duration
     require(
-        growth < MOST_GROWTH, "duration", duration,
-        f"the loop is unstable and grows by e^{growth:.0f}; at most {MOST_GROWTH * duration / max(growth, 1):.3g} s",
-    )  # fmt: skip
+        growth < most_growth,
+        "duration",
+        duration,
+        f"the loop is unstable and grows by e^{growth:.0f}; at most {most_growth * duration / max(growth, 1):.3g} s",
+    )
     delay = poles.loop.law.delay
     kinds = [(0.0, True, False), (delay, False, True)] if delay else [(0.0, True, True)]
     of = [(start, Transforms(poles.loop, names, excitation, *which)) for start, *which in kinds]
@@ -279,7 +284,9 @@ class Transforms:
     @cached_property
     def far(self) -> Complex:
         """Places far right of all poles [1/s]."""
-        return np.array(FAR_RIGHT, complex) * max(first_frequency(self.loop.arm), *abs(self.loop.law.poles), 0.0)
+        return np.array(FAR_RIGHT, complex) * max(
+            first_frequency(self.loop.arm), *abs(self.loop.law.poles), 0.0
+        )
 
     @cached_property
     def shares(self) -> Real:
@@ -317,17 +324,21 @@ class Transforms:
         whole = rig * driven / D + added
         direct = self.shares * driven / den + added
         rest = whole - direct
-        rest[-1] = -driven * fed_back / (D * den)  # the same without cancellation
+        # the same without cancellation
+        rest[-1] = -driven * fed_back / (D * den)
         return whole, direct, rest
 
 
 def _part(poles: Poles, of: Transforms, start: float, duration: float) -> DelayedResponse:
     """The response to a part of the excitation."""
+    most_close = 0.1
     left, _, _, top = poles.box
     own = np.array(of.excitation.poles, complex)
     known = np.r_[poles.values, own]
     edges = [*poles.loop.k.singular, left, 1j * top]
-    late = _terms(known, edges, MOST_CLOSE * first_frequency(poles.loop.arm), lambda s: of.parts(s)[0], duration)
+    late = _terms(
+        known, edges, most_close * first_frequency(poles.loop.arm), lambda s: of.parts(s)[0], duration
+    )
     slowest = float(late[0].real[late[0].imag > top / 2].max(initial=left))
 
     # 20 time constants of the poles outside the box; above it as well, or until frequencies up to four times its top
@@ -335,7 +346,8 @@ def _part(poles: Poles, of: Transforms, start: float, duration: float) -> Delaye
     resolved = 2 * np.pi * POINTS / (4 * 4 * top)
     end = max(decayed / -left, min(decayed / max(-slowest, LEAST_SIZE), resolved))
     growth = float(known.real.max(initial=0.0))
-    end = min(end, 10 / max(growth, LEAST_SIZE))  # where an unstable pole has grown by e^10
+    # where an unstable pole has grown by e^10
+    end = min(end, 10 / max(growth, LEAST_SIZE))
     # a first inversion ends 64 times sooner, for what begins as the root of time
     rests = tuple(invert_transform(lambda s: of.parts(s)[2], each, growth) for each in (end / 64, end))
     direct = _terms(np.r_[own, of.loop.law.poles], [], math.inf, lambda s: of.parts(s)[1], end)
@@ -367,9 +379,14 @@ def _terms(
 
     Real edges bound circles on the real axis, imaginary ones at any place.
     """
+    # poles closer than 3/T are one circle, but no farther apart than 0.1 of the first mode
+    close = 3.0
+    # of the least distance of two circles: by so little a centre is off the real axis
+    on_axis = 1e-9
     every, count = np.unique(np.r_[0, known, known[known.imag != 0].conj()], return_counts=True)
-    reach = min(CLOSE / duration, most_close)
-    alike = 0.01 * np.maximum(-np.maximum.outer(every.real, every.real), 0)  # a multiple pole that rounding has split
+    reach = min(close / duration, most_close)
+    # a multiple pole that rounding has split
+    alike = 0.01 * np.maximum(-np.maximum.outer(every.real, every.real), 0)
     _, label = connected_components(abs(every[:, None] - every) <= np.maximum(reach, alike))
     found = []
     for n in range(label.max() + 1):
@@ -379,9 +396,9 @@ def _terms(
         beyond = 2 * (abs(every).max() + 1 / duration)
         nearest = [complex(edge.real or c.real, edge.imag or c.imag) for edge in map(complex, edges)]
         room = float(abs(np.r_[every[label != n], nearest, beyond] - c).min())
-        if c.imag >= -ON_AXIS * reach:
+        if c.imag >= -on_axis * reach:
             z, amplitudes = _circle(own, order, c, room, transform, duration)
-            found.append((z, amplitudes * (2.0 if c.imag > ON_AXIS * reach else 1.0)))
+            found.append((z, amplitudes * (2.0 if c.imag > on_axis * reach else 1.0)))
     z, amplitudes = zip(*found, strict=True)
     return np.concatenate(z), np.hstack(amplitudes)
 
@@ -390,14 +407,24 @@ def _circle(
     own: Complex, order: int, c: complex, room: float, transform: Transform, duration: float
 ) -> tuple[Complex, Complex]:
     """The nodes of a circle around poles, to a distance of `room` from others; of a simple pole its residue."""
+    # over T, of a circle around s = 0, on which e^{s T} is moderate; or times the extent of its poles
+    slow_radius = 2.0
+    # of the way to the next pole: radius of the circle of one pole
+    pole_radius = 0.25
+    # of circles; e^-40 is below the rounding
+    pole_nodes = 32
+    fewest_nodes = 128
+    most_nodes = 512
+    node_log = 40.0
     is_simple = order == 1 and c != 0
     extent = float(abs(own - c).max())
-    radius = POLE_RADIUS * room
+    radius = pole_radius * room
     if not is_simple:
-        moderate = max(SLOW_RADIUS * max(extent, 1 / duration), -c.real / 2)  # where e^{s t} does not grow
+        # where e^{s t} does not grow
+        moderate = max(slow_radius * max(extent, 1 / duration), -c.real / 2)
         radius = min(max(math.sqrt(extent * room), radius), moderate)
     ratio = max(extent / radius, radius / room)
-    nodes = int(np.clip(-NODE_LOG / math.log(ratio), POLE_NODES if is_simple else FEWEST_NODES, MOST_NODES))
+    nodes = int(np.clip(-node_log / math.log(ratio), pole_nodes if is_simple else fewest_nodes, most_nodes))
     arrow = radius * np.exp(2j * np.pi * (np.arange(nodes) + 0.5) / nodes)
     values = transform(c + arrow) * arrow / nodes
     return (own, values.sum(axis=1)[:, None]) if is_simple else (c + arrow, values)

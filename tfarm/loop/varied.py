@@ -23,7 +23,13 @@ from tfarm.crossing import Line
 from tfarm.errors import ConvergenceError, require
 from tfarm.exact.characteristic import Analytic
 from tfarm.exact.outputs import OUTPUTS
-from tfarm.loop.continuous import NEAREST_TO_ORIGIN, ORDER_READ_AT, ContinuousLoop, by_differences, frequency_above_mode
+from tfarm.loop.continuous import (
+    NEAREST_TO_ORIGIN,
+    ORDER_READ_AT,
+    ContinuousLoop,
+    by_differences,
+    frequency_above_mode,
+)
 from tfarm.loop.lines import LawTerms
 from tfarm.loop.poles import box_of, poles_below, slow_poles
 from tfarm.records import frozen
@@ -31,14 +37,19 @@ from tfarm.spectrum.box import Box, winding_number
 from tfarm.spectrum.following import polish_roots
 from tfarm.spectrum.table import first_frequency
 
-OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}  # units, as of the arm's below
+# units, as of the arm's below
+OF_THE_LAW = {gain.name: gain.unit for gain in LISTED} | {"all": "1"}
 ARM_PARAMETERS = {
-    "payload_mass": "kg", "payload_inertia": "kg m^2", "hub_inertia": "kg m^2", "length": "m", "damping": "s"
-}  # fmt: skip
+    "payload_mass": "kg",
+    "payload_inertia": "kg m^2",
+    "hub_inertia": "kg m^2",
+    "length": "m",
+    "damping": "s",
+}
 
 EMPTY = Box(0.0, 0.0, 0.0, 0.0)
-FACTORS = {"all": "factor on all gains", "gain": "factor on the controller"}  # labels of these numbers
-Title = tuple[str, str]  # label and unit
+# label and unit
+Title = tuple[str, str]
 
 
 @frozen
@@ -68,7 +79,9 @@ class Varied:
             arm = loop.arm
             K1 = loop.gains[RATE_GAIN] if loop.gains else 0.0
             passes = arm.rate_loss and arm.lossless_hub.has_massless_hub and -arm.rate_loss >= K1
-            remedy = f"with hub.inertia = 0 a pole passes through infinity at {RATE_GAIN} = {-arm.rate_loss:.6g}"
+            remedy = (
+                f"with hub.inertia = 0 a pole passes through infinity at {RATE_GAIN} = {-arm.rate_loss:.6g}"
+            )
             require(not passes, key, value, f"{remedy}: stay above it, or give the hub an inertia")
 
     # ------------------------------------------------------------ loops and functions
@@ -87,10 +100,14 @@ class Varied:
     @property
     def title(self) -> Title:
         """Label and unit of the number, for a heading; a pure one has no unit."""
+        # labels of these numbers
+        factors = {"all": "factor on all gains", "gain": "factor on the controller"}
         name = self.vary.removesuffix(".gain")
         plain = name.replace("_", " ") if self.is_of_arm else name
         is_factor = name.partition("@")[0] in OUTPUTS
-        return FACTORS.get(name, f"factor on {plain}" if is_factor else plain), "" if self.unit == "1" else self.unit
+        return factors.get(
+            name, f"factor on {plain}" if is_factor else plain
+        ), "" if self.unit == "1" else self.unit
 
     @property
     def is_reactive(self) -> bool:
@@ -104,7 +121,11 @@ class Varied:
 
     def law_at(self, value: float) -> Law:
         """The law where the number has that value."""
-        return self.full if self.is_of_arm else self.full.having("gain" if self.vary == "all" else self.vary, value)
+        return (
+            self.full
+            if self.is_of_arm
+            else self.full.having("gain" if self.vary == "all" else self.vary, value)
+        )
 
     def at(self, value: float) -> ContinuousLoop:
         """The loop where the number has that value."""
@@ -124,7 +145,11 @@ class Varied:
     @cached_property
     def first(self) -> ContinuousLoop:
         """The loop at the first value."""
-        return self.at(self.start) if self.is_of_arm else ContinuousLoop(self.case.under(self.law_at(self.start)))
+        return (
+            self.at(self.start)
+            if self.is_of_arm
+            else ContinuousLoop(self.case.under(self.law_at(self.start)))
+        )
 
     @cached_property
     def pinned(self) -> int:
@@ -196,7 +221,8 @@ class Varied:
         rests = np.zeros(guess.shape, bool)
         for n in np.flatnonzero(resting):
             nearest = np.argsort(abs(np.where(np.isnan(guess[n]), np.inf, guess[n])))
-            both = np.where(guess[n, nearest].imag > 0, 2, 1).cumsum()  # of a pair that rests
+            # of a pair that rests
+            both = np.where(guess[n, nearest].imag > 0, 2, 1).cumsum()
             rests[n, nearest[both <= resting[n]]] = True
         wanted = ~np.isnan(guess) & ~rests
         for n in np.flatnonzero((wanted & (guess == 0)).any(axis=1)):
@@ -219,7 +245,8 @@ class Varied:
         """All poles in the box at one value, both of each pair, and those next to the guesses that lie outside it."""
         near = self.near(np.array([value]), np.where(guess.imag < 0, np.nan, guess)[None])[0]
         near = near[~np.isnan(near) & (near != 0) & ~self.box.holds(near)]
-        with np.errstate(over="ignore"):  # of a pole on its way through infinity
+        # of a pole on its way through infinity
+        with np.errstate(over="ignore"):
             inside = poles_below(self.at(value), self.box.im_max).values[self.pinned :]
         upper = np.r_[inside, near]
         return np.r_[upper, upper[upper.imag > 0].conj()]
@@ -243,7 +270,9 @@ class Varied:
             with suppress(ConvergenceError):
                 found.count(self.start)
                 return found
-        raise ConvergenceError(f"a pole is on the edge of every box at {self.vary} = {self.start:.6g}", self, 0.0)
+        raise ConvergenceError(
+            f"a pole is on the edge of every box at {self.vary} = {self.start:.6g}", self, 0.0
+        )
 
     def count(self, value: float) -> int:
         """Number of poles in the box at one value, without those at 0, by the winding number."""

@@ -24,13 +24,13 @@ from tfarm.spectrum.gains import gain_unit, most_gain
 from tfarm.spectrum.table import first_frequency
 
 End = Literal["edge", "search bound", "no limit"]
-SEARCH_RANGE = Quantity("search range", digits=5, key="search_range", help="values between which limits were searched")
+SEARCH_RANGE = Quantity(
+    "search range", digits=5, key="search_range", help="values between which limits were searched"
+)
 ENDS = "an end with < or > is that of the search range: no limit was found up to there"
 
 # of the search range, times `gain_unit`
-WINDOW_REACH = 20.0
 FARTHER_REACH = {MOMENT_GAIN: 50.0}
-BEYOND_LAW = 10.0  # times the number of the law: least search range too
 
 
 class Interval(NamedTuple):
@@ -38,12 +38,12 @@ class Interval(NamedTuple):
 
     low: Annotated[float, Quantity("from", help="lower end")]
     high: Annotated[float, Quantity("to", help="upper end")]
-    low_is: Annotated[End, Quantity(help="kind of the lower end: poles on the axis, search range, or no limit")] = (
-        "edge"
-    )
-    high_is: Annotated[End, Quantity(help="kind of the upper end: poles on the axis, search range, or no limit")] = (
-        "edge"
-    )
+    low_is: Annotated[
+        End, Quantity(help="kind of the lower end: poles on the axis, search range, or no limit")
+    ] = "edge"
+    high_is: Annotated[
+        End, Quantity(help="kind of the upper end: poles on the axis, search range, or no limit")
+    ] = "edge"
 
     def as_text(self, digits: int) -> str:
         """The interval; < or > marks an end that is only that of the search."""
@@ -61,14 +61,20 @@ class Windows:
     or infinity by a theorem ("no limit").  Crossings are those up to `band` [rad/s], inf where no pole crosses beyond.
     """
 
-    name: Annotated[str, Quantity("gain or coefficient", key="number", help="number of the controller that varies")]
+    name: Annotated[
+        str, Quantity("gain or coefficient", key="number", help="number of the controller that varies")
+    ]
     value: Annotated[float, Quantity("value", help="its value in the controller")]
-    unit: Annotated[str, Quantity("unit", help="of a gain at the hub; empty of a pure number and of coefficients")]
+    unit: Annotated[
+        str, Quantity("unit", help="of a gain at the hub; empty of a pure number and of coefficients")
+    ]
     around: Window | None
     all: tuple[Window, ...]
     looked_at: Annotated[Window, SEARCH_RANGE]
     crossings: Crossings
-    band: Annotated[float, Quantity(key="up_to_rad_s", help="frequency up to which crossings were searched")] = math.inf
+    band: Annotated[
+        float, Quantity(key="up_to_rad_s", help="frequency up to which crossings were searched")
+    ] = math.inf
 
     @property
     def interval(self) -> Annotated[Interval | None, Quantity("stable around it", digits=8, help=ENDS)]:
@@ -76,7 +82,9 @@ class Windows:
         return None if self.around is None else self._shown(self.around)
 
     @property
-    def intervals(self) -> Annotated[list[Interval], Quantity("all stability intervals", digits=8, help=ENDS)]:
+    def intervals(
+        self,
+    ) -> Annotated[list[Interval], Quantity("all stability intervals", digits=8, help=ENDS)]:
         """All intervals, with the kinds of their ends."""
         return list(map(self._shown, self.all))
 
@@ -103,7 +111,9 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
     if not loop.is_of_gains and (verdict.word == "marginal" or loop.arm.has_elastic_link):
         return {}
     ranges = {name: looked_at(loop, name) for name in names or numbers}
-    solved = {name: pair for name, pair in ranges.items() if pair[0] < pair[1] and not is_decided_along(loop, name)}
+    solved = {
+        name: pair for name, pair in ranges.items() if pair[0] < pair[1] and not is_decided_along(loop, name)
+    }
     lines, band = _lines(verdict, solved)
     done: dict[str, Windows] = {}
     for name, limits in ranges.items():
@@ -116,13 +126,16 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
                 reach = band
                 stable = _stable(verdict, name, limits, found, band)
             except ConvergenceError:
-                continue  # poles cannot be counted: `Margins.intervals_note` names the number
+                # poles cannot be counted: `Margins.intervals_note` names the number
+                continue
         else:
             found = theorem_edges(loop, name, limits)
             stable = theorem_windows(loop, name, limits, found)
         stable = [_with_proven_ends(loop, name, pair, limits) for pair in stable]
         # Kp = 0 is an end of its own interval: that is the pole at 0 which the verdict leaves out
-        inside = (pair for pair in stable if pair[0] < value < pair[1] or (name == "Kp" and pair[0] == value == 0))
+        inside = (
+            pair for pair in stable if pair[0] < value < pair[1] or (name == "Kp" and pair[0] == value == 0)
+        )
         around = next(inside, None) if verdict.is_stable else None
         done[name] = Windows(name, value, unit, around, tuple(stable), limits, found.within(*limits), reach)
     return done
@@ -133,16 +146,20 @@ def looked_at(loop: ContinuousLoop, name: str) -> Window:
 
     Of a leading coefficient without which high modes are unstable: from a tenth of its value on, with its sign.
     """
+    # of the search range, times `gain_unit`
+    window_reach = 20.0
+    # times the number of the law: least search range too
+    beyond_law = 10.0
     arm = loop.arm
     value = loop.numbers[name]
     if not loop.is_of_gains:
         if name.endswith(LEADING) and value and not is_known_without(loop, name):
-            low, high = sorted((value / BEYOND_LAW, value * BEYOND_LAW))
+            low, high = sorted((value / beyond_law, value * beyond_law))
             return low, high
-        return -BEYOND_LAW * abs(value), BEYOND_LAW * abs(value)
+        return -beyond_law * abs(value), beyond_law * abs(value)
     if name == MOMENT_GAIN and arm.has_massless_hub:
         return 0.0, 0.0
-    reach = max(FARTHER_REACH.get(name, WINDOW_REACH) * gain_unit(arm, name), BEYOND_LAW * abs(value))
+    reach = max(FARTHER_REACH.get(name, window_reach) * gain_unit(arm, name), beyond_law * abs(value))
     carried = arm.gauged_inertia
     if name == MOMENT_GAIN and 0 < carried < math.inf:
         # 2.0 times J/(J - I_h), where K2 cancels the inertia: least search range
@@ -179,7 +196,8 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
     at = value
     resting = [each.change for each in found if each.t == value and each.at == 0]
     is_known = verdict.word != "marginal"
-    if is_known and resting in ([1], [-1]):  # the verdict leaves that pole out
+    # the verdict leaves that pole out
+    if is_known and resting in ([1], [-1]):
         count += resting[0] > 0
     elif not (is_known and any(low < value < high for low, high in pairs)):
         at = sum(pairs[len(pairs) // 2]) / 2
@@ -195,7 +213,8 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
         if carried.tolist() != [unstable_at(end) for end in limits]:
             stable = join_neighbours([pair for pair in pairs if unstable_at(sum(pair) / 2) == 0])
     if name == RATE_GAIN and not loop.arm.hub_side_inertia:
-        least = 0.0 - loop.arm.rate_loss  # where friction is cancelled a pole of such a hub passes through infinity
+        # where friction is cancelled a pole of such a hub passes through infinity
+        least = 0.0 - loop.arm.rate_loss
         stable = [(max(start, least), end) for start, end in stable if end > least]
     return stable
 
@@ -243,7 +262,9 @@ def theorem_edges(loop: ContinuousLoop, name: str, limits: Window) -> Crossings:
 
 def theorem_windows(loop: ContinuousLoop, name: str, limits: Window, edges: Crossings) -> list[Window]:
     """The stability intervals of such a gain: there every mode is damped, and the static stiffness is positive."""
-    return join_neighbours([pair for pair in edges.spans(*limits) if is_held(loop.having(name, sum(pair) / 2))])
+    return join_neighbours(
+        [pair for pair in edges.spans(*limits) if is_held(loop.having(name, sum(pair) / 2))]
+    )
 
 
 def is_held(loop: ContinuousLoop) -> bool:
@@ -269,4 +290,6 @@ def reach_words(found: Iterable[Windows]) -> str:
     bands = [each.band for each in found if math.isfinite(each.band)]
     if not bands:
         return ""
-    return f"stability intervals are of poles up to {max(bands):.4g} rad/s: beyond, poles may cross inside them"
+    return (
+        f"stability intervals are of poles up to {max(bands):.4g} rad/s: beyond, poles may cross inside them"
+    )

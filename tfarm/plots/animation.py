@@ -17,11 +17,11 @@ from tfarm.digits import plain
 from tfarm.dsp import Simulation
 from tfarm.dsp.traces import RATE, Motion, motion_of
 from tfarm.files import write_file
+from tfarm.plots.style import BLUE, GREY, INK, check_records, picture, settled, style
 from tfarm.records import frozen
 
-from .style import BLUE, GREY, INK, check_records, picture, settled, style
-
-DOTS = 104  # an inch, of a frame
+# an inch, of a frame
+DOTS = 104
 
 
 def _edges(motion: Motion) -> Real:
@@ -48,7 +48,16 @@ def draw_motion(motion: Motion, *, ax: Axes) -> None:
     ax.add_patch(Circle((0, 0), max(arm.hub.radius, 0.05 * arm.reach), fc="#e9e9e9", ec=INK, zorder=3))
     for places, colour, lw, mark in ((motion.reference, GREY, 0.9, ""), (motion.link, BLUE, 3.0, "s")):
         here = places[motion.still]
-        ax.plot(here.real, here.imag, color=colour, lw=lw, solid_capstyle="butt", marker=mark, ms=6.0, markevery=[-1])
+        ax.plot(
+            here.real,
+            here.imag,
+            color=colour,
+            lw=lw,
+            solid_capstyle="butt",
+            marker=mark,
+            ms=6.0,
+            markevery=[-1],
+        )
     scale = "deflection to scale" if motion.factor == 1 else f"deflection × {motion.factor}"
     speed = "" if motion.speed == 1 else f", speed × {plain(motion.speed, 2)}"
     ax.set_xlabel(f"hub to tip {plain(arm.reach, 3)} m, thin: reference,\n{scale}{speed}")

@@ -15,8 +15,7 @@ from matplotlib.path import Path
 
 from tfarm.arm import Arm, Attachment
 from tfarm.digits import how_many, plain, unit
-
-from .style import BLUE, FAINT, GREEN, GREY, INK, ORANGE, PURPLE, Axes, picture
+from tfarm.plots.style import BLUE, FAINT, GREEN, GREY, INK, ORANGE, PURPLE, Axes, picture
 
 
 def _spiral() -> Path:
@@ -28,7 +27,9 @@ def _spiral() -> Path:
 SPIRAL = _spiral()
 # a spring hung below its place, and the ground under it; half of a mark's size is its height
 _ZIGZAG = [(0, 0), (0, -0.2), (0.2, -0.3), (-0.2, -0.45), (0.2, -0.6), (-0.2, -0.75), (0, -0.85), (0, -1)]
-GROUNDED = Path([*_ZIGZAG, (-0.4, -1), (0.4, -1)], [Path.MOVETO, *[Path.LINETO] * 7, Path.MOVETO, Path.LINETO])
+GROUNDED = Path(
+    [*_ZIGZAG, (-0.4, -1), (0.4, -1)], [Path.MOVETO, *[Path.LINETO] * 7, Path.MOVETO, Path.LINETO]
+)
 
 
 class _Scale:
@@ -51,7 +52,9 @@ class _Scale:
 
 def _depth(section: Any) -> float:
     """Return the depth [m] in the plane of bending; of a general section that of a rectangle with its I/A."""
-    return math.sqrt(12) * section.radius_of_gyration if section.half_depth is None else 2 * section.half_depth
+    return (
+        math.sqrt(12) * section.radius_of_gyration if section.half_depth is None else 2 * section.half_depth
+    )
 
 
 def _size(arm: Arm) -> tuple[float, float]:
@@ -119,14 +122,18 @@ def _draw_hub(arm: Arm, scale: _Scale, ax: Axes) -> None:
     colour = "#e9e9e9" if hub.inertia else "white"
     ax.add_patch(Circle((0, 0), radius, fc=colour, ec=INK, lw=1.2, gid="hub", label=words, zorder=1.2))
     if hub.radius:
-        ax.plot([0, hub.radius], [0, 0], color=INK, lw=3.5, solid_capstyle="butt", gid="hub.radius", zorder=1.5)
+        ax.plot(
+            [0, hub.radius], [0, 0], color=INK, lw=3.5, solid_capstyle="butt", gid="hub.radius", zorder=1.5
+        )
     _mark(ax, "axis", 0.0, None, marker="o", ms=3.5, color=INK)
 
 
 def _draw_link(arm: Arm, scale: _Scale, ax: Axes) -> None:
     """Segments, and the joints between them."""
     ends = arm.hub.radius + np.cumsum([0.0, *(link.length for link in arm.links)])
-    words = f"link, {_value('L', arm.length, 'm')}" + (f", {how_many(len(arm.links), 'segment')}" if arm.outer else "")
+    words = f"link, {_value('L', arm.length, 'm')}" + (
+        f", {how_many(len(arm.links), 'segment')}" if arm.outer else ""
+    )
     enlarged = f", depth drawn × {_number(scale.factor, 2)}" if scale.factor > 1 else ", to scale"
     words += enlarged if scale.is_even else ", depth not to scale"
     colours = cycle(("#cfe0ee", "#e3ecd5"))
@@ -139,7 +146,9 @@ def _draw_link(arm: Arm, scale: _Scale, ax: Axes) -> None:
     for number, x in enumerate(ends[1:-1], 1):
         half = max(scale.depths[number - 1 : number + 1]) / 2 + scale.hundredth
         label = "joint of segments" if number == 1 else None
-        ax.plot([x, x], [-half, half], color=BLUE, lw=1.6, gid=f"segment.joint.{number}", label=label, zorder=2.5)
+        ax.plot(
+            [x, x], [-half, half], color=BLUE, lw=1.6, gid=f"segment.joint.{number}", label=label, zorder=2.5
+        )
 
 
 def _draw_gauge(arm: Arm, scale: _Scale, ax: Axes) -> None:
@@ -149,7 +158,9 @@ def _draw_gauge(arm: Arm, scale: _Scale, ax: Axes) -> None:
     segment = int(np.searchsorted(ends, gauge.x, side="left" if gauge.side == "inner" else "right"))
     y = scale.depths[min(segment, len(ends) - 1)] / 2
     words = "strain gauge" + (f", {_value('x', gauge.x, 'm')}" if gauge.x else " at the root")
-    _mark(ax, "gauge", arm.hub.radius + gauge.x, words, y=y, marker="s", ms=6.0, mfc=GREEN, mec="white", mew=0.6)
+    _mark(
+        ax, "gauge", arm.hub.radius + gauge.x, words, y=y, marker="s", ms=6.0, mfc=GREEN, mec="white", mew=0.6
+    )
 
 
 def _draw_attachments(arm: Arm, ax: Axes) -> None:
@@ -208,7 +219,9 @@ def _draw_springs(arm: Arm, ax: Axes) -> None:
     """Rotary springs of clamp, joint and hub."""
     for name, x, spring in (("clamp", arm.hub.radius, arm.clamp), ("joint", 0.0, arm.joint)):
         if not spring.is_rigid:
-            _mark(ax, name, x, f"{name} spring, {_value('k', spring.stiffness, 'N m/rad')}", **_spring(ORANGE))
+            _mark(
+                ax, name, x, f"{name} spring, {_value('k', spring.stiffness, 'N m/rad')}", **_spring(ORANGE)
+            )
     if arm.hub.stiffness:
         label = f"spring from hub to ground, {_value('k', arm.hub.stiffness, 'N m/rad')}"
         _mark(ax, "hub.stiffness", 0.0, label, **_spring(PURPLE, 18.0))

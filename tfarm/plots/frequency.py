@@ -17,9 +17,7 @@ from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit, ResponseBand, ShareOfArms
 from tfarm.fitting.overlay import Overlay
 from tfarm.loop.curve import decibels
-from tfarm.response.frequency import Bode
-
-from .style import (
+from tfarm.plots.style import (
     BLUE,
     COLOURS,
     FAINT,
@@ -34,22 +32,28 @@ from .style import (
     plain_ticks,
     safe,
 )
+from tfarm.response.frequency import Bode
 
-RAD_PER_CYCLE = 2 * np.pi  # rad/s of 1 Hz
-TICKS_A_DECADE = (1.0, 2.0, 5.0)  # where a measurement covers few of them
+# rad/s of 1 Hz
+RAD_PER_CYCLE = 2 * np.pi
+# where a measurement covers few of them
+TICKS_A_DECADE = (1.0, 2.0, 5.0)
 FREQUENCY = "angular frequency [rad/s]"
 FREQUENCY_HZ = "frequency [Hz]"
 PHASE = "phase [deg]"
 POINTS: dict[str, Any] = {"ls": "none", "marker": ".", "ms": 3.5, "color": ORANGE, "zorder": 3}
 EXACT = "flexible arm, exact"
-Drawn = tuple[Real, Complex, dict[str, Any]]  # a curve over x: its values and looks
+# a curve over x: its values and looks
+Drawn = tuple[Real, Complex, dict[str, Any]]
 
 
 @picture(
     (Bode, "tfarm.bode returns"),
     size=(9.0, 6.2),
     rows=(1.75, 1.0),
-    title=lambda data: "{0.arm.name}: {0.input_label} to {0.label}".format(next(iter(by_name(data).values()))),
+    title=lambda data: "{0.arm.name}: {0.input_label} to {0.label}".format(
+        next(iter(by_name(data).values()))
+    ),
 )
 def bode(data: Bode | Mapping[str, Bode], *, ax: Sequence[Axes]) -> None:
     """Magnitude over phase of a response (from `tfarm.bode`), in two axes, those given or new ones: these axes.
@@ -77,16 +81,27 @@ def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
     limits = np.array([magnitude_limits(one) for one in each.values()])
     low = float(limits[:, 0].min())
     high = float(limits[:, 1].max())
-    label = f"|{first.label} / {first.input_label}|\nmagnitude [dB re 1 {first.gain_unit}]".replace("1 −", "1")
+    label = f"|{first.label} / {first.input_label}|\nmagnitude [dB re 1 {first.gain_unit}]".replace(
+        "1 −", "1"
+    )
     # above them a line of mode numbers
     over_frequency(ax, label, 1.085)
     ax.set(xlim=first.band, ylim=(low, high))
     for (name, one), colour in zip(each.items(), cycle(COLOURS), strict=False):
-        edges = np.repeat([high + 20.0, low - 20.0], [one.infinite.size, one.vanishing.size])  # off the picture
+        # off the picture
+        edges = np.repeat([high + 20.0, low - 20.0], [one.infinite.size, one.vanishing.size])
         jumps = np.r_[one.infinite, one.vanishing]
         ax.plot(*broken(one.omega, decibels(one.value), jumps, edges), color=colour, label=safe(name))
     if np.any(first.rigid):
-        ax.plot(first.omega, decibels(first.rigid), color=GREY, lw=1.0, ls=(0, (4, 3)), zorder=1.5, label="rigid arm")
+        ax.plot(
+            first.omega,
+            decibels(first.rigid),
+            color=GREY,
+            lw=1.0,
+            ls=(0, (4, 3)),
+            zorder=1.5,
+            label="rigid arm",
+        )
     _mark_roots(first, ax)
     if first.arm.has_cutoff and first.band[0] < first.arm.shear_cutoff < first.band[1]:
         ax.axvline(first.arm.shear_cutoff, color=ORANGE, lw=1.0, ls="-.", label="shear cut-off")
@@ -103,7 +118,8 @@ def draw_phase(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
         ax.plot(*broken(one.omega, one.phase, jumps, np.full(jumps.size, np.nan)), color=colour)
     ax.set(xscale="log", xlim=one.band, xlabel=FREQUENCY, ylabel=PHASE)
     ax.margins(y=0.1)
-    ax.yaxis.set_major_locator(MaxNLocator(5, steps=(1, 1.8, 4.5, 9, 10)))  # right angles and parts of them
+    # right angles and parts of them
+    ax.yaxis.set_major_locator(MaxNLocator(5, steps=(1, 1.8, 4.5, 9, 10)))
 
 
 def over_frequency(ax: Axes, label: str, height: float = 1.0) -> None:
@@ -137,7 +153,9 @@ def broken(x: Real, y: Real, at: Real, limit: Real) -> tuple[Real, Real]:
     limit = limit[order]
     where = np.repeat(np.searchsorted(x, at), 3)
     gap = np.full(at.size, np.nan)
-    return np.insert(x, where, np.c_[at, gap, at].ravel()), np.insert(y, where, np.c_[limit, gap, limit].ravel())
+    return np.insert(x, where, np.c_[at, gap, at].ravel()), np.insert(
+        y, where, np.c_[limit, gap, limit].ravel()
+    )
 
 
 def magnitude_limits(data: Bode) -> tuple[float, float]:
@@ -145,7 +163,8 @@ def magnitude_limits(data: Bode) -> tuple[float, float]:
     if data.is_zero:
         return -20.0, 20.0
     roots = np.r_[data.infinite, data.vanishing]
-    away = (abs(data.omega[:, None] / roots - 1) > 0.004).all(axis=1)  # nearer ones set no limit of the picture
+    # nearer ones set no limit of the picture
+    away = (abs(data.omega[:, None] / roots - 1) > 0.004).all(axis=1)
     size = decibels(np.array([each for each in (*abs(data.value[away]), *abs(data.rigid[:1])) if each > 0]))
     margin = max(5.0, 0.06 * np.ptp(size))
     return size.min() - margin, size.max() + margin
@@ -173,7 +192,8 @@ def _mark_roots(data: Bode, ax: Axes) -> None:
                 zorder=5,
                 label=label,
             )
-    for number, omega in enumerate(data.resonances.imag, 1):  # that far apart two digits do not touch
+    # that far apart two digits do not touch
+    for number, omega in enumerate(data.resonances.imag, 1):
         note(
             str(number),
             (omega, ax.get_ylim()[1]),
@@ -198,13 +218,20 @@ def _over_measured(one: Measured, curves: Sequence[Drawn], upper: Axes, lower: A
     size = abs(one.values)
     upper.plot(hertz, size, label="measured", **POINTS)
     lower.plot(hertz, np.degrees(np.angle(one.values)), **POINTS)
-    draw_curves([(omega / RAD_PER_CYCLE, values, looks) for omega, values, looks in curves], np.abs, upper, lower)
-    within = np.log10([each for each in (*size, *(np.median(abs(values)) for _, values, _ in curves)) if each > 0])
-    margin = 0.15 + 0.125 * np.ptp(within)  # an infinite peak of the exact curve leaves the picture
+    draw_curves(
+        [(omega / RAD_PER_CYCLE, values, looks) for omega, values, looks in curves], np.abs, upper, lower
+    )
+    within = np.log10(
+        [each for each in (*size, *(np.median(abs(values)) for _, values, _ in curves)) if each > 0]
+    )
+    # an infinite peak of the exact curve leaves the picture
+    margin = 0.15 + 0.125 * np.ptp(within)
     upper.set(yscale="log", ylim=10 ** np.array([within.min() - margin, within.max() + margin]))
     upper.yaxis.set_minor_formatter(NullFormatter())
     for ax in (upper, lower):
-        ax.set(xscale="log" if hertz[-1] > 5 * hertz[0] else "linear", xlim=hertz[[0, -1]], xlabel=FREQUENCY_HZ)
+        ax.set(
+            xscale="log" if hertz[-1] > 5 * hertz[0] else "linear", xlim=hertz[[0, -1]], xlabel=FREQUENCY_HZ
+        )
         plain_ticks(ax.xaxis, 4, TICKS_A_DECADE)
 
 
@@ -212,7 +239,9 @@ def _over_measured(one: Measured, curves: Sequence[Drawn], upper: Axes, lower: A
     (Fit, "tfarm.fit returns"),
     size=lambda fit: (max(7.0, 5.2 * len(fit.responses)), 6.0),
     title=lambda fit: f"{fit.before.name}: {fit.verdict}",
-    grid=lambda figure, fit: figure.subplots(2, max(1, len(fit.responses)), sharex="col", height_ratios=(1.75, 1.0)),
+    grid=lambda figure, fit: figure.subplots(
+        2, max(1, len(fit.responses)), sharex="col", height_ratios=(1.75, 1.0)
+    ),
 )
 def fitted(fit: Fit, *, ax: Sequence[Axes]) -> None:
     """Draw each measured response with the arm's before and after: magnitude over phase, a column a response.
@@ -282,7 +311,10 @@ def measured(data: Overlay, *, ax: Sequence[Axes]) -> None:
             [pole * ratio for pole, ratio in paired if ratio is not None],
             {"color": ORANGE, "lw": 0.7, "ls": (0, (2, 3)), "label": "its measured frequency"},
         ),
-        (np.divide(data.unmatched, RAD_PER_CYCLE), {"color": INK, "lw": 0.8, "ls": ":", "label": "peak of no pole"}),
+        (
+            np.divide(data.unmatched, RAD_PER_CYCLE),
+            {"color": INK, "lw": 0.8, "ls": ":", "label": "peak of no pole"},
+        ),
     )
     for at, looks in guides:
         for frequency in at:

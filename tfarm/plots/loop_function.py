@@ -19,26 +19,25 @@ from tfarm.loop.curve import LoopCurve, decibels, gain_margin
 from tfarm.loop.loop_margins import LoopMargins
 from tfarm.loop.margins import Margins
 from tfarm.loop.nyquist import Nyquist, compress_radius
-
-from .frequency import FREQUENCY, Drawn, draw_curves, over_frequency, parted
-from .style import BLUE, FAINT, GREY, INK, UNSTABLE, Axes, gains_words, note, picture, safe
+from tfarm.plots.frequency import FREQUENCY, Drawn, draw_curves, over_frequency, parted
+from tfarm.plots.style import BLUE, FAINT, GREY, INK, UNSTABLE, Axes, gains_words, note, picture, safe
 
 # dB of L that are drawn: so that the part near 0 dB shows
-HIGHEST = 60.0
 LOWEST = -80.0
-USUAL_PEAK = 2.0  # Ms that is usual at most
-CLOSED_LOOP = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.25, 0.5, 1.0, 3.0, 6.0)  # dB: |T| of the contours of a Nichols chart
-AROUND: Complex = np.exp(1j * math.pi * np.linspace(-1, 1, 721) ** 3)  # a circle, dense at 1, where T/(1 - T) is steep
-ZOOM = (-2.2, 0.4, -1.3, 1.3)  # of L around -1: Re from and to, Im from and to
-RING_SIZES = (0.2, 0.5, 1.0, 2.0, 5.0, math.inf)  # |L| of the rings
+# Ms that is usual at most
+USUAL_PEAK = 2.0
+# dB: |T| of the contours of a Nichols chart
+CLOSED_LOOP = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.25, 0.5, 1.0, 3.0, 6.0)
+# a circle, dense at 1, where T/(1 - T) is steep
+AROUND: Complex = np.exp(1j * math.pi * np.linspace(-1, 1, 721) ** 3)
+# of L around -1: Re from and to, Im from and to
+ZOOM = (-2.2, 0.4, -1.3, 1.3)
 # of the first arc at infinity, and of the picture
-ARC_RADIUS = 1.04
-REACH = 1.35
-ARCS_ALIKE = math.radians(20.0)  # arcs whose ends are as near as that turn alike
 # marks of margins
 GAIN = "o"
 PHASE_MARGIN = "D"
-DIGITS = 4  # of a margin, as on a card
+# of a margin, as on a card
+DIGITS = 4
 Looks = dict[str, Any]
 
 
@@ -47,11 +46,18 @@ def decisive(band: LoopMargins) -> Iterator[tuple[float, complex, str, str]]:
 
     Of each its frequency [rad/s], nan without one, L there, label and marker.
     """
-    for factor, name in zip(band.gain[::-1] if band.gain[0] else band.gain[1:], ("GM", "GM downwards"), strict=False):
+    for factor, name in zip(
+        band.gain[::-1] if band.gain[0] else band.gain[1:], ("GM", "GM downwards"), strict=False
+    ):
         size, omega = gain_margin(band, factor)
         yield omega or math.nan, -1 / factor, f"{name} {_at(size, 'dB', omega)}", GAIN
     angle, omega = band.phase_margin
-    yield omega or math.nan, -cmath.exp(1j * math.radians(angle)), f"PM {_at(abs(angle), 'deg', omega)}", PHASE_MARGIN
+    yield (
+        omega or math.nan,
+        -cmath.exp(1j * math.radians(angle)),
+        f"PM {_at(abs(angle), 'deg', omega)}",
+        PHASE_MARGIN,
+    )
 
 
 def _at(size: float, unit: str, omega: float | None) -> str:
@@ -70,7 +76,15 @@ def _looks(curve: LoopCurve, of: str = "", color: str = BLUE) -> Looks:
 def _marked(curve: LoopCurve, label: str, marker: str, size: float = 6.5) -> Looks:
     """A filled mark of a continuous-time loop, an open one of a sampled loop."""
     inside, edge, words = (INK, "white", "") if curve.period is None else ("white", INK, ", sampled")
-    return {"ls": "none", "marker": marker, "mfc": inside, "mec": edge, "ms": size, "zorder": 5, "label": label + words}
+    return {
+        "ls": "none",
+        "marker": marker,
+        "mfc": inside,
+        "mec": edge,
+        "ms": size,
+        "zorder": 5,
+        "label": label + words,
+    }
 
 
 def _of_loop(words: str, **how: Any) -> Callable[[Callable[..., None]], Any]:
@@ -85,12 +99,14 @@ def _of_loop(words: str, **how: Any) -> Callable[[Callable[..., None]], Any]:
 
 def draw_loops(curves: Iterable[Drawn], label: str, upper: Axes, lower: Axes) -> None:
     """|L| [dB] of loops over their frequencies with the line 0 dB, and its angle from -180 to 180 degrees."""
+    # dB of L that are drawn: so that the part near 0 dB shows
+    highest = 60.0
     draw_curves(curves, decibels, upper, lower)
     upper.axhline(0.0, color=GREY, lw=0.9)
     lower.hlines([-180, 180], 0, 1, color=GREY, lw=0.9, transform=lower.get_yaxis_transform())
     over_frequency(upper, label)
     low, high = upper.get_ylim()
-    upper.set_ylim(max(low, LOWEST + min(0.0, high)), np.clip(high, 5.0, HIGHEST + max(0.0, low)))
+    upper.set_ylim(max(low, LOWEST + min(0.0, high)), np.clip(high, 5.0, highest + max(0.0, low)))
     lower.set(xscale="log", xlim=upper.get_xlim(), xlabel=FREQUENCY)
 
 
@@ -119,7 +135,9 @@ def loop(found: Margins | LoopCurve, *, ax: Sequence[Axes]) -> None:
                 angle = math.degrees(float(np.angle(L)))
                 upper.plot([omega], [size], **_marked(each, label, marker))
                 lower.plot([omega], [angle], **_marked(each, label, marker))
-                place, ends = (upper, (size, 0)) if marker == GAIN else (lower, (math.copysign(180, angle), angle))
+                place, ends = (
+                    (upper, (size, 0)) if marker == GAIN else (lower, (math.copysign(180, angle), angle))
+                )
                 place.plot([omega, omega], ends, color=INK, lw=1.6, ls=_looks(each)["ls"], zorder=4)
 
 
@@ -179,7 +197,9 @@ def sensitivity(found: Margins | LoopCurve, *, ax: Axes) -> None:
         ):
             ax.plot(each.omega, values, lw=width, **_looks(each, f"|{name}|, ", colour))
             if each.margins is not None:
-                peak, omega = each.margins.sensitivity_peak if name == "S" else each.margins.complementary_peak
+                peak, omega = (
+                    each.margins.sensitivity_peak if name == "S" else each.margins.complementary_peak
+                )
                 label = f"M{name.lower()} {_at(peak, '', omega)}"
                 ax.plot([omega or math.nan], [decibels(peak)], **_marked(each, label, marker, size))
     ax.axhline(0.0, color=GREY, lw=0.9)
@@ -213,8 +233,11 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
     L = np.where(data.is_arc | ~np.isfinite(data.L), np.nan, data.L)
     # at least as far as the zoom
     edge = float(np.clip(1.1 * np.nanmax(abs(L)), 2.2, 20.0))
-    zoom = ax.inset_axes((5 / 9, 0, 4 / 9, 1))  # as wide as the plot, a quarter of that between both
-    ticks = [tick for tick in MaxNLocator(5, steps=(1, 2, 5, 10)).tick_values(-edge, edge) if abs(tick) <= edge]
+    # as wide as the plot, a quarter of that between both
+    zoom = ax.inset_axes((5 / 9, 0, 4 / 9, 1))
+    ticks = [
+        tick for tick in MaxNLocator(5, steps=(1, 2, 5, 10)).tick_values(-edge, edge) if abs(tick) <= edge
+    ]
     ax.set(
         aspect="equal",
         frame_on=False,
@@ -225,7 +248,9 @@ def nyquist(data: Nyquist, *, ax: Axes, name: str = "") -> None:
         ylabel="Im L [−]",
     )
     ax.set_xlabel("Re L [−]", loc="left")
-    frame = ax.add_patch(Rectangle((-edge, -edge), 2 * edge, 2 * edge, fill=False, ec=GREY, lw=0.8, clip_on=False))
+    frame = ax.add_patch(
+        Rectangle((-edge, -edge), 2 * edge, 2 * edge, fill=False, ec=GREY, lw=0.8, clip_on=False)
+    )
     zoom.set(xlim=ZOOM[:2], ylim=ZOOM[2:], xlabel="Re L [−], zoom at −1")
     circles: list[tuple[complex, float, Looks]] = [
         (0.0, 1.0, {"color": GREY, "ls": "-", "label": "|L| = 1"}),
@@ -254,14 +279,19 @@ def disc(data: Nyquist, *, ax: Axes, name: str = "") -> None:
 
     A size r of L is drawn as r/(1 + r): the rim is infinity, -1 lies half way.  `name`: that of the controller.
     """
-    radii = [1.0 if math.isinf(size) else size / (1 + size) for size in RING_SIZES]
-    ax.set(aspect="equal", yticks=[], xlim=(-REACH, REACH), ylim=(-REACH, REACH), frame_on=False)
+    # |L| of the rings
+    ring_sizes = (0.2, 0.5, 1.0, 2.0, 5.0, math.inf)
+    reach = 1.35
+    radii = [1.0 if math.isinf(size) else size / (1 + size) for size in ring_sizes]
+    ax.set(aspect="equal", yticks=[], xlim=(-reach, reach), ylim=(-reach, reach), frame_on=False)
     for radius in radii:
-        ax.add_patch(Circle((0, 0), radius, fill=False, ec=GREY if radius in (0.5, 1.0) else FAINT, lw=0.7, zorder=0.6))
+        ax.add_patch(
+            Circle((0, 0), radius, fill=False, ec=GREY if radius in (0.5, 1.0) else FAINT, lw=0.7, zorder=0.6)
+        )
     _curve(np.where(data.is_arc, np.nan, compress_radius(data.L)), -0.5, 1.0, ax)
     _arcs(data, ax)
     ax.set_xlabel("|L| at the rings [−]", loc="right")
-    ax.set_xticks(radii, [plain(size).replace("inf", "∞") for size in RING_SIZES], fontsize=7.5)
+    ax.set_xticks(radii, [plain(size).replace("inf", "∞") for size in ring_sizes], fontsize=7.5)
     ax.set_title(_words(data, name), fontsize=9.0, loc="center")
 
 
@@ -280,30 +310,55 @@ def arrows(z: Complex, ax: Axes, shares: Sequence[float] = (0.5,), color: str = 
     to_view = ax.transData - ax.transAxes
     at = to_view.transform(np.c_[z.real, z.imag])
     seen = np.flatnonzero(((at > 0) & (at < 1)).all(axis=1))
-    way = np.diff(at[seen], axis=0) * (np.diff(seen) == 1)[:, None]  # none from where it leaves the view to its return
+    # none from where it leaves the view to its return
+    way = np.diff(at[seen], axis=0) * (np.diff(seen) == 1)[:, None]
     along = np.cumsum(np.hypot(*way.T))
     for n in np.searchsorted(along, along[-1] * np.array(shares)) if along.max(initial=0.0) > 0.05 else ():
         half = 0.015 * way[n] / np.hypot(*way[n])
         tail, head = to_view.inverted().transform(at[seen[n]] + way[n] / 2 + [-half, half]).tolist()
-        looks = {"arrowstyle": "-|>", "color": color, "lw": 0.0, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 15}
+        looks = {
+            "arrowstyle": "-|>",
+            "color": color,
+            "lw": 0.0,
+            "shrinkA": 0,
+            "shrinkB": 0,
+            "mutation_scale": 15,
+        }
         ax.annotate("", head, tail, arrowprops=looks, zorder=3.5)
 
 
 def _arcs(data: Nyquist, ax: Axes) -> None:
     """Past poles as arcs beyond the rim, one for all that turn alike."""
+    # of the first arc at infinity, and of the picture
+    arc_radius = 1.04
+    # arcs whose ends are as near as that turn alike
+    arcs_alike = math.radians(20.0)
     z = compress_radius(data.L)
     alike: dict[tuple[int, int], list[tuple[Whole, float, float]]] = {}
     for piece in np.split(np.arange(z.size), np.flatnonzero(np.diff(data.is_arc.astype(int))) + 1):
         if data.is_arc[piece[0]]:
             first, *_, last = np.unwrap(np.angle(data.L[piece])).tolist()
-            alike.setdefault((round(first / ARCS_ALIKE), round(last / ARCS_ALIKE)), []).append((piece, first, last))
-    step = min(0.03, (1.2 - ARC_RADIUS) / max(1, len(alike) - 1))  # from one radius to the next, the last being 1.2
+            alike.setdefault((round(first / arcs_alike), round(last / arcs_alike)), []).append(
+                (piece, first, last)
+            )
+    # from one radius to the next, the last being 1.2
+    step = min(0.03, (1.2 - arc_radius) / max(1, len(alike) - 1))
     for number, same in enumerate(alike.values()):
         piece, first, last = same[0]
-        ring = (ARC_RADIUS + step * number) * np.exp(1j * np.linspace(first, last, 61))
+        ring = (arc_radius + step * number) * np.exp(1j * np.linspace(first, last, 61))
         whole = np.r_[z[piece[0] - 1 : piece[0]], ring, z[piece[-1] + 1 : piece[-1] + 2]]
-        ax.plot(whole.real, whole.imag, color=BLUE, lw=0.8, ls=(0, (3, 1.5)), zorder=3, label="past poles on the axis")
+        ax.plot(
+            whole.real,
+            whole.imag,
+            color=BLUE,
+            lw=0.8,
+            ls=(0, (3, 1.5)),
+            zorder=3,
+            label="past poles on the axis",
+        )
         arrows(ring, ax, color=BLUE)
         if len(same) > 1:
             place = 1.28 * ring[30] / abs(ring[30])
-            ax.text(place.real, place.imag, f"{len(same)} ×", fontsize=8.0, color=BLUE, ha="center", va="center")
+            ax.text(
+                place.real, place.imag, f"{len(same)} ×", fontsize=8.0, color=BLUE, ha="center", va="center"
+            )

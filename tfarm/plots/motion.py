@@ -23,12 +23,8 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.fitting.recording import RunComparison
 from tfarm.loop.circle_crossings import GainMap
 from tfarm.loop.plane import Plane
-from tfarm.schema import text
-from tfarm.spectrum import Modes
-from tfarm.tuner import LearningCurves, Tuning
-
-from .regions import overlay
-from .style import (
+from tfarm.plots.regions import overlay
+from tfarm.plots.style import (
     BLUE,
     FAINT,
     FIGURES,
@@ -45,15 +41,20 @@ from .style import (
     picture,
     safe,
 )
+from tfarm.schema import text
+from tfarm.spectrum import Modes
+from tfarm.tuner import LearningCurves, Tuning
 
-SHAPE_POINTS = 401  # of a drawn mode: about one to a pixel of its picture
+# of a drawn mode: about one to a pixel of its picture
+SHAPE_POINTS = 401
 ALONG = "distance from the hub, x [m]"
 DISPLACEMENT = "displacement w(x), largest = 1 [−]"
 TIME = "time [s]"
 DASHED = (0, (4, 3))
 DOTTED = (0, (1, 2))
 LONG_DASHED = (0, (5, 3))
-OF_STABILITY = {"stable": (STABLE, "o"), "marginal": (MARGINAL, "s"), "unstable": (UNSTABLE, "x")}  # colour, mark
+# colour, mark
+OF_STABILITY = {"stable": (STABLE, "o"), "marginal": (MARGINAL, "s"), "unstable": (UNSTABLE, "x")}
 
 
 def scaled(found: Modes, count: int) -> dict[int, Real]:
@@ -105,7 +106,9 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
         one.plot(nodes, 0 * nodes, "o", ms=5.5, mfc="white", mec=INK, mew=1.3, zorder=4)
         one.set(xlim=(-0.085 * length, 1.11 * length), ylim=(-1.28, 1.28), yticks=[-1, 0, 1])
         one.locator_params(axis="x", nbins=5)
-        omega, hertz = (significant(float(of[row]), 7) for of in (found.natural_frequency, found.natural_frequency_hz))
+        omega, hertz = (
+            significant(float(of[row]), 7) for of in (found.natural_frequency, found.natural_frequency_hz)
+        )
         places = ", ".join(plain(node, 3) for node in nodes.tolist()) or "none"
         one.set_title(f"Mode {number}:  {omega} rad/s  ({hertz} Hz)\nnodes [m]: {places}", fontsize=9.5)
         if not one.figure.get_supylabel():
@@ -120,9 +123,13 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
     (Simulation, "tfarm.simulate returns"),
     size=(9.0, 7.0),
     rows=(1.35, 1.0, 1.0),
-    title=lambda arm, runs, what="": f"{arm.name}: {what or next(iter(by_name(runs).values())).scenario.name}",
+    title=lambda arm, runs, what="": (
+        f"{arm.name}: {what or next(iter(by_name(runs).values())).scenario.name}"
+    ),
 )
-def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", *, ax: Sequence[Axes]) -> None:
+def slew(
+    arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", *, ax: Sequence[Axes]
+) -> None:
     """Simulations of one scenario (from `tfarm.simulate`; several by name) in three axes, given or new; these.
 
     Root moment [N m], tip less a rigid arm's on its reference [mm], and the torque of the motor [N m], or its input.
@@ -156,7 +163,8 @@ def slew(arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", 
         axes.set(xlim=(0.0, float(scenario.t[-1])), xlabel=TIME, ylabel=label)
     points, finer = min(traces.points_a_period(arm, run) for run in each.values())
     coarse = (
-        f"{plain(points, 2)} points a period of the fastest mode shown; between={finer} gives {traces.POINTS_A_PERIOD}"
+        f"{plain(points, 2)} points a period of the fastest mode shown; "
+        f"between={finer} gives {traces.POINTS_A_PERIOD}"
     )
     moment.set_title(coarse if points < traces.POINTS_A_PERIOD else "", loc="right", fontsize=8.0, color=GREY)
 
@@ -214,7 +222,9 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
         if (reference := found.reference.get(name)) is not None:
             ends = np.sort(reference[-1] * np.array([1 - found.settling_band, 1 + found.settling_band]))
             one.axhspan(*ends, color=FAINT, lw=0, alpha=0.6, zorder=0)
-            one.plot(t, reference[: t.size], color=GREY, lw=0.8, label=f"reference, {text(found.settling_band)}")
+            one.plot(
+                t, reference[: t.size], color=GREY, lw=0.8, label=f"reference, {text(found.settling_band)}"
+            )
         for loop, each in found.loops.items():
             y = each.signals[name][: t.size]
             label = f"{loop}, {each.stability}"
@@ -251,7 +261,9 @@ def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes])
     for column, (name, found) in zip(axes.T, each.items(), strict=True):
         measured = found.measured
         run = found.run
-        column[0].plot(measured.t, np.degrees(measured.reference), color=GREY, lw=1.0, ls=DASHED, label="reference")
+        column[0].plot(
+            measured.t, np.degrees(measured.reference), color=GREY, lw=1.0, ls=DASHED, label="reference"
+        )
         for one, label in zip(column, ("hub angle [deg]", "root moment [N m]"), strict=False):
             one.set(title=safe(name), xlim=(0.0, float(measured.t[-1])), ylabel=label)
             one.label_outer()
@@ -275,7 +287,9 @@ def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     """A tuned gain over time (from `tfarm.tune`) in its guard, in the axes given or new ones; the axes."""
     guard = found.training.guard
     result = found.training.result
-    ax.axhspan(guard.lo, guard.hi, color=REGIONS[0], lw=0, zorder=0.5, label="guard: proven for any K(t) in it")
+    ax.axhspan(
+        guard.lo, guard.hi, color=REGIONS[0], lw=0, zorder=0.5, label="guard: proven for any K(t) in it"
+    )
     ax.step(result.t, result.K, where="post", color=INK, lw=1.4, label="the tuner's gain K(t)")
     best = found.best_constant.gain
     ax.axhline(best, color=GREY, lw=1.2, ls=LONG_DASHED, label=f"best constant gain, {significant(best, 3)}")
@@ -294,14 +308,19 @@ def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, 
     left, right = ax
     overlay(continuous, sampled, ax=left)
     left.set_title("", loc="right")
-    left.lines[-1].remove()  # the mark of one controller: the bar is at its rate gain
+    # the mark of one controller: the bar is at its rate gain
+    left.lines[-1].remove()
     guard = tuning.training.guard
     K = tuning.training.result.K
     at, _ = tuning.trial.loop.gains.point
-    for ends, colour, width, alpha in ((guard.lo, guard.hi), STABLE, 9, 0.75), ((K.min(), K.max()), INK, 2.4, None):
+    for ends, colour, width, alpha in (
+        ((guard.lo, guard.hi), STABLE, 9, 0.75),
+        ((K.min(), K.max()), INK, 2.4, None),
+    ):
         left.plot([at, at], ends, solid_capstyle="butt", zorder=6, color=colour, lw=width, alpha=alpha)
     tuned_gain(tuning, ax=right)
-    left.set_ylim(-0.25, 1.25)  # from 0 to the continuous loop's bound, 1, and a quarter to either side
+    # from 0 to the continuous loop's bound, 1, and a quarter to either side
+    left.set_ylim(-0.25, 1.25)
     if right.get_shared_y_axes().joined(left, right):
         right.set_ylabel("")
 
@@ -313,10 +332,13 @@ def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, 
 def draw_curves(curves: LearningCurves, tuning: Tuning, *, ax: Axes) -> None:
     """Learning curves: each seed, median and quartiles, and the baselines; diverged ones leave through the top."""
     trial = np.arange(1, curves.costs.shape[1] + 1)
-    top = 1.25 * tuning.without.cost  # higher costs are drawn at the top edge
+    # higher costs are drawn at the top edge
+    top = 1.25 * tuning.without.cost
     low, middle, high = (np.minimum(costs, 2 * top) for costs in curves.quartile_curves.values())
     ax.plot(trial, np.minimum(curves.costs, 2 * top).T, color="#b9b9b9", lw=0.6, zorder=1)
-    ax.fill_between(trial, low, high, color=BLUE, alpha=0.22, lw=0, zorder=2, label="middle half of the seeds")
+    ax.fill_between(
+        trial, low, high, color=BLUE, alpha=0.22, lw=0, zorder=2, label="middle half of the seeds"
+    )
     ax.plot(trial, middle, color=BLUE, lw=1.8, zorder=3, label="median")
     for cost, ls, label in (
         (tuning.without.cost, DOTTED, "no moment feedback"),

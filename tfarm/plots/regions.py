@@ -21,10 +21,9 @@ from tfarm.crossing import Window, pieces
 from tfarm.digits import how_many, plain, scientific, significant
 from tfarm.loop.circle_crossings import GainMap
 from tfarm.loop.plane import INFINITE, LINEAR_SCALE, Axis, BoundaryLines, Plane
-
-from .frequency import bode
-from .loop_function import draw_loops
-from .style import (
+from tfarm.plots.frequency import bode
+from tfarm.plots.loop_function import draw_loops
+from tfarm.plots.style import (
     COLOURS,
     GREY,
     INK,
@@ -41,10 +40,11 @@ from .style import (
     safe,
 )
 
-LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)  # proven by the argument of the paper at C = 0
-SLATE = "#3d5468"  # of contours of damping: no colour of stability
+# proven by the argument of the paper at C = 0
+LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)
+# of contours of damping: no colour of stability
+SLATE = "#3d5468"
 # edges of a sampled loop, and of a second one
-DASHED = (0, (5, 2.5))
 DASH_DOTTED = (0, (6, 2, 1, 2))
 
 
@@ -76,7 +76,9 @@ def gain_map(found: Plane | GainMap, *, ax: Axes) -> None:
             draw_boundary(found, found.boundary_lines, x, y, ax)
             return
     points = [
-        (at, t) for at, each in zip(found.x, found.crossings, strict=False) for t in each.within(y.low, y.high).gain
+        (at, t)
+        for at, each in zip(found.x, found.crossings, strict=False)
+        for t in each.within(y.low, y.high).gain
     ]
     if points:
         ax.plot(*np.transpose(points), ".", color=INK, ms=2.0, label="a pole on the stability limit, exact")
@@ -120,7 +122,9 @@ def _counts(found: Plane | GainMap, counts: Whole, ax: Axes) -> None:
             # of the picture's width or height: else there is no room for a number
             if room[row, column] > 0.028:
                 mark = "∞" if count == INFINITE else str(count)
-                ax.text(found.x[column], found.y[row], mark, fontsize=9.0, ha="center", va="center", clip_on=True)
+                ax.text(
+                    found.x[column], found.y[row], mark, fontsize=9.0, ha="center", va="center", clip_on=True
+                )
 
 
 def colours(unstable: Whole) -> Real:
@@ -136,7 +140,11 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     """
     least = np.nanmin(damping, initial=np.inf)
     largest = np.nanmax(damping, initial=0.0)
-    levels = [each for each in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(least, largest) if least < each < largest]
+    levels = [
+        each
+        for each in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(least, largest)
+        if least < each < largest
+    ]
     if not levels:
         return
     # of the logarithm lines are straighter
@@ -146,7 +154,11 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     )
     to_view = ax.transData - ax.transAxes
     kept = [
-        [p for p in parts if np.array_equal(p[0], p[-1]) or np.hypot(*np.ptp(to_view.transform(p), axis=0)) > 1 / 12]
+        [
+            p
+            for p in parts
+            if np.array_equal(p[0], p[-1]) or np.hypot(*np.ptp(to_view.transform(p), axis=0)) > 1 / 12
+        ]
         for parts in lines.allsegs
     ]
     lines.set_paths([Path.make_compound_path(*map(Path, parts)) for parts in kept])
@@ -186,13 +198,16 @@ def _undamped_boundary(found: Plane, resting: Real, x: Axis, y: Axis, ax: Axes) 
     edges are one line.
     """
     for low, high in found.stable_intervals[-1]:
-        edges = [end for end in (low, high) if found.y[0] < end < found.y[-1]]  # another end is that of the map
+        # another end is that of the map
+        edges = [end for end in (low, high) if found.y[0] < end < found.y[-1]]
         ax.vlines(found.upright, max(low, y.low), min(high, y.high), color=INK, lw=1.8)
         ax.hlines(edges, found.upright, x.high, color=INK, lw=1.8, label="stability boundary, exact")
     if found.is_known:
         whole = found.arm.input_per_torque
         omega = ", ".join(significant(float(w), 4) for w in resting)
-        ax.hlines(whole, x.low, x.high, color=INK, lw=0.8, label=f"every mode with the hub at rest: {omega} … rad/s")
+        ax.hlines(
+            whole, x.low, x.high, color=INK, lw=0.8, label=f"every mode with the hub at rest: {omega} … rad/s"
+        )
         ax.vlines(found.upright, whole, y.high, color=INK, lw=0.8)
         return
     label = "a mode with the hub at rest, ω in rad/s at the right"
@@ -209,11 +224,13 @@ def draw_region(
 
     Edges are upright where the region itself begins or ends.
     """
+    # edges of a sampled loop, and of a second one
+    dashed = (0, (5, 2.5))
     line: dict[str, Any] = {"color": INK, "lw": 1.0, "ls": ls, "zorder": 2.5}
     looks: dict[str, Any] = {"facecolor": REGIONS[0], "lw": 0}
     key = looks | {"edgecolor": INK, "ls": ls, "lw": 1.0}
     if hatch:
-        line = {"color": STABLE, "lw": 1.4, "ls": DASHED, "zorder": 4.5}
+        line = {"color": STABLE, "lw": 1.4, "ls": dashed, "zorder": 4.5}
         key = looks = {"facecolor": "none", "hatch": hatch, "edgecolor": (*to_rgb(STABLE), 0.5), "lw": 0}
     parts = pieces(across, stable)
     for piece in parts:
@@ -232,7 +249,9 @@ def draw_region(
     (Plane, "tfarm.map returns of gains at the hub"),
     (GainMap, "tfarm.dsp.sampled_map returns"),
     size=(9.0, 5.7),
-    title=lambda continuous, _: f"{continuous.arm.name}: gains that keep the loop stable, continuous and sampled",
+    title=lambda continuous, _: (
+        f"{continuous.arm.name}: gains that keep the loop stable, continuous and sampled"
+    ),
 )
 def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes) -> None:
     """Both regions of the two gains, in the axes given or in new ones; the axes.
@@ -243,7 +262,8 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
     planes = sampled if isinstance(sampled, Sequence) else [sampled]
     ms = plain(1e3 * planes[0].loop.chain.sampling.period)
     (low, *_, high), (bottom, *_, top) = continuous.axes
-    inside = 0.008 * (top - bottom)  # so that where intervals are cut no edge is seen
+    # so that where intervals are cut no edge is seen
+    inside = 0.008 * (top - bottom)
     ax.set(xscale="log" if low > 0 else "linear", xlim=(low, high), ylim=(bottom + inside, top - inside))
     plain_ticks(ax.xaxis)
     ax.grid(False)
@@ -261,7 +281,8 @@ def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes
         hypothesis = "" if continuous.arm.damping == C else f", if C were {scientific(C, 1)} s"
         label = f"stable, sampled every {ms} ms{hypothesis if C else f', C = 0: the first {plane.modes_used} modes'}"
         draw_region(plane.x, plane.stable_intervals, label, ax, hatch=hatch)
-    if continuous.arm.is_uniform:  # of a rig the argument needs more: see `tfarm.loop.theorem`
+    # of a rig the argument needs more: see `tfarm.loop.theorem`
+    if continuous.arm.is_uniform:
         label = f"below it: proven by energy at C = 0 ({LYAPUNOV})"
         ax.axhline(1.0, color=INK, lw=1.1, ls=(0, (5, 3)), zorder=4, label=label)
     loop = planes[0].loop
@@ -301,13 +322,17 @@ def draw_stability_map(
         label = f"Lyapunov ({LYAPUNOV}): {kind}"
         ax.plot([0, 0, x.high], [y.low, 1, 1], color=GREY, lw=2.2, ls=dashes, label=label)
         if not arm.is_undamped:
-            ax.plot([0, x.high], [0, 0], color=GREY, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven")
+            ax.plot(
+                [0, x.high], [0, 0], color=GREY, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven"
+            )
     for point, label, is_best in laws:
         mark, size = ("*", 13.0) if is_best else ("D", 8.0)
         ax.plot(*point, mark, ms=size, mfc=INK, mec="white", mew=1.0, zorder=7, ls="none", label=label)
     if bounds:
         (a, b), (c, d) = (bounds[name] for name in PLANE)
-        ax.plot([a, b, b, a, a], [c, c, d, d, c], color=GREY, lw=0.8, ls=(0, (1, 2)), label="bounds of its search")
+        ax.plot(
+            [a, b, b, a, a], [c, c, d, d, c], color=GREY, lw=0.8, ls=(0, (1, 2)), label="bounds of its search"
+        )
 
 
 # ------------------------------------------------------------ two arms, or two laws on one arm
@@ -330,12 +355,15 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
     if data.is_of_arms:
         bode(dict(zip(data.names, data.responses, strict=True)), ax=(upper, lower))
     else:
-        looks = ({"color": colour, "label": safe(name)} for name, colour in zip(data.names, COLOURS, strict=False))
+        looks = (
+            {"color": colour, "label": safe(name)} for name, colour in zip(data.names, COLOURS, strict=False)
+        )
         loops = [(*side.loop_function, how) for side, how in zip(data.sides, looks, strict=True)]
         place = "at the samples" if data.is_sampled else "loop opened at the input"
         draw_loops(loops, f"|L|, {place} [dB]", upper, lower)
     upper.set_xlabel("")
-    upper.tick_params(labelbottom=False)  # the frequencies of the phase below
+    # the frequencies of the phase below
+    upper.tick_params(labelbottom=False)
     right.grid(False)
     right.set_facecolor(REGIONS[1])
     if data.is_sampled or data.regions is None:
@@ -357,7 +385,15 @@ def _factors(data: Comparison, ax: Axes) -> None:
     for stable, side, ls in zip(reaches, data.sides, ("-", DASH_DOTTED), strict=True):
         draw_region(1e3 * delay, stable, f"{side.name}: stable", ax, ls=ls)
     ax.plot(
-        [0.0], [1.0], "o", mfc=INK, mec="white", ms=7.5, zorder=7, clip_on=False, label="the controllers as they are"
+        [0.0],
+        [1.0],
+        "o",
+        mfc=INK,
+        mec="white",
+        ms=7.5,
+        zorder=7,
+        clip_on=False,
+        label="the controllers as they are",
     )
     ax.axhline(1.0, color=INK, lw=0.6)
     ax.set(

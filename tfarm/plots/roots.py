@@ -13,10 +13,8 @@ from tfarm.errors import one_line
 from tfarm.loop.loci import POLE_DIGITS, Loci, ReducedLocus, held_branches
 from tfarm.loop.locus import BranchCrossing, Locus, frame, origin_name, view
 from tfarm.loop.sampled_modes import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
-from tfarm.response.frequency import AXIS_SHARE
-
-from .loop_function import arrows
-from .style import (
+from tfarm.plots.loop_function import arrows
+from tfarm.plots.style import (
     FAINT,
     FIGURES,
     GREY,
@@ -32,11 +30,12 @@ from .style import (
     note,
     picture,
 )
+from tfarm.response.frequency import AXIS_SHARE
 
-THIN: dict[str, Any] = {"lw": 0.9, "ls": (0, (2, 1.5)), "zorder": 3}  # of the reduced model
 GRID: dict[str, Any] = {"color": FAINT, "lw": 0.7, "zorder": 0.6}
 VALUE: dict[str, Any] = {"fontsize": 7.0, "color": GREY}
-Z_RATIOS = (0.1, 0.3, 0.5, 0.7, 0.9)  # damping ratios in the z-plane
+# damping ratios in the z-plane
+Z_RATIOS = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 
 def zoomed(exact: Locus) -> list[int]:
@@ -76,6 +75,8 @@ def _title(exact: Locus, *_: object) -> str:
 
 def _panel(exact: Locus, reduced: ReducedLocus | None, numbers: Sequence[int], ax: Axes) -> None:
     """Draw some branches, exact and reduced, with marks at a few values and their crossings."""
+    # of the reduced model
+    thin: dict[str, Any] = {"lw": 0.9, "ls": (0, (2, 1.5)), "zorder": 3}
     which = list(numbers)
     branches = held_branches(exact.smooth.branches)
     shown = branches[which]
@@ -85,17 +86,20 @@ def _panel(exact: Locus, reduced: ReducedLocus | None, numbers: Sequence[int], a
     wide = 0.12 * (right - left)
     tall = 0.12 * (high - low)
     ax.set(
-        xlim=(left - wide, right + 2 * wide), ylim=(low - tall, high + tall), xlabel="Re s [1/s]", ylabel="Im s [rad/s]"
+        xlim=(left - wide, right + 2 * wide),
+        ylim=(low - tall, high + tall),
+        xlabel="Re s [1/s]",
+        ylabel="Im s [rad/s]",
     )
     ax.xaxis.set_major_locator(MaxNLocator(4))
     s_grid(ax, is_named=everything)
     _draw_branches(shown, ax)
     if reduced is not None:
-        ax.plot([], [], color=INK, label=f"python-control, reduced model of order {reduced.order}", **THIN)
+        ax.plot([], [], color=INK, label=f"python-control, reduced model of order {reduced.order}", **thin)
         for s in held_branches(reduced.branches[which]):
             # between two values where it meets the real axis: no corner is cut off
             meets = np.flatnonzero(np.diff((s.imag == 0).astype(int))) + 1
-            ax.plot(np.insert(s.real, meets, np.nan), np.insert(s.imag, meets, np.nan), color=INK, **THIN)
+            ax.plot(np.insert(s.real, meets, np.nan), np.insert(s.imag, meets, np.nan), color=INK, **thin)
     way = 1 if exact.gain[-1] > exact.gain[0] else -1
     _mark_values(exact, way, which, ax)
     for s in shown:
@@ -161,7 +165,9 @@ def edge_marks(poles: Complex, ax: Axes) -> None:
             value = plain(p.real, 3) + (f" + {plain(p.imag, 3)}i" if p.imag else "")
             far.setdefault(place, []).append(value)
     for (x, y), values in far.items():
-        mark, side, ha = ("<", 7, "left") if x == left else (">", -7, "right") if x == right else ("^", 7, "left")
+        mark, side, ha = (
+            ("<", 7, "left") if x == left else (">", -7, "right") if x == right else ("^", 7, "left")
+        )
         ax.plot(x, y, mark, color=GREY, ms=6.5, mec="white", zorder=5, clip_on=False)
         note(", ".join(values), (x, y), ax, **VALUE, xytext=(side, 4), ha=ha, va="baseline")
 
@@ -197,7 +203,9 @@ def s_grid(ax: Axes, *, is_named: bool = True) -> None:
         x = max(left, -high * slope)
         y = min(high, -left / slope)
         looks = VALUE | {"xytext": (3, -3), "va": "top" if x > left else "center"}
-        is_apart = (high - y) / (high - bottom) - x / (right - left) > apart and y > bottom + 0.1 * (high - bottom)
+        is_apart = (high - y) / (high - bottom) - x / (right - left) > apart and y > bottom + 0.1 * (
+            high - bottom
+        )
         if is_apart and note(f"ζ {plain(ratio)}", (x, y), ax, (apart, apart), **looks):
             ax.plot([0.0, x], [0.0, y], **GRID)
     for omega in MaxNLocator(6).tick_values(bottom, high) if left < 0 else ():

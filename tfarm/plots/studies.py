@@ -12,6 +12,9 @@ from tfarm.arm.schema import file_key, file_keys
 from tfarm.digits import how_many, unit
 from tfarm.errors import require
 from tfarm.exact.outputs import signal_words, unit_over
+from tfarm.plots.frequency import over_frequency
+from tfarm.plots.motion import OF_STABILITY
+from tfarm.plots.style import BLUE, GREY, INK, Axes, number_label, picture, plain_ticks, safe
 from tfarm.studies.quantities import (
     COLUMNS,
     Spread,
@@ -22,19 +25,13 @@ from tfarm.studies.quantities import (
 )
 from tfarm.studies.study import Study
 
-from .frequency import over_frequency
-from .motion import OF_STABILITY
-from .style import BLUE, GREY, INK, Axes, number_label, picture, plain_ticks, safe
-
 # axes of distributions side by side, and in all
 ACROSS = 4
 MOST_QUANTITIES = 12
 # of a scatter picture: axes, and arms
-MOST_NUMBERS = 4
-MOST_ROWS = 3
 MOST_MARKS = 1000
-LINE = 24  # letters of a label of such small axes
-FIRST = ("gain_margin_db", "phase_margin_deg", "delay_margin_ms", "peak_sensitivity")  # where there are too many
+# letters of a label of such small axes
+LINE = 24
 LOOKS: dict[str, dict[str, Any]] = {
     "continuous": {"fill": True, "color": BLUE, "alpha": 0.4, "label": "continuous-time"},
     "sampled": {"fill": False, "color": INK, "lw": 1.1, "label": "sampled"},
@@ -43,17 +40,21 @@ LOOKS: dict[str, dict[str, Any]] = {
 MARKS = {**OF_STABILITY, "": (GREY, "^"), "arm": (BLUE, "o")}
 
 
-def distributions(found: Study, quantity: str | None = None, most: int = MOST_QUANTITIES) -> list[list[Spread]]:
+def distributions(
+    found: Study, quantity: str | None = None, most: int = MOST_QUANTITIES
+) -> list[list[Spread]]:
     """Return the distributions of a quantity, or of all, those of both loops together: first margins, then others.
 
     Raises ParameterError where the study has no number of it.
     """
+    # where there are too many
+    first = ("gain_margin_db", "phase_margin_deg", "delay_margin_ms", "peak_sensitivity")
     both: dict[str, list[Spread]] = {}
     names = column_names([quantity]) if quantity else COLUMNS
     for each in (each for each in found.spreads if each.name in names):
         both.setdefault(each.name.replace(f"{loop_of(each.name)}.", ""), []).append(each)
     require(both, "quantity", quantity, "the study has no number of it: name it in `ask`")
-    return [both[name] for name in sorted(both, key=lambda name: name not in FIRST)][:most]
+    return [both[name] for name in sorted(both, key=lambda name: name not in first)][:most]
 
 
 def _grid(figure: Any, *of: Any) -> None:
@@ -65,7 +66,10 @@ def _grid(figure: Any, *of: Any) -> None:
 @picture(
     (Study, "tfarm.study returns"),
     grid=_grid,
-    size=lambda *of: (max(4.5, 2.4 * min(n := len(distributions(*of)), ACROSS)), 0.9 + 2.0 * math.ceil(n / ACROSS)),
+    size=lambda *of: (
+        max(4.5, 2.4 * min(n := len(distributions(*of)), ACROSS)),
+        0.9 + 2.0 * math.ceil(n / ACROSS),
+    ),
     title=lambda found, *_: f"{found.arm}: distributions over {how_many(found.done, 'arm')}",
 )
 def study(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> None:
@@ -87,7 +91,13 @@ def study(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> N
             height = np.max(counts) * (1.08 + 0.1 * n)
             one.stairs(own, edges, **looks)
             one.plot(
-                [of.low, of.median, of.high], [height] * 3, "|-", ms=7, markevery=[1], color=looks["color"], lw=1.2
+                [of.low, of.median, of.high],
+                [height] * 3,
+                "|-",
+                ms=7,
+                markevery=[1],
+                color=looks["color"],
+                lw=1.2,
             )
         label = _folded(f"{quantity_of(each[0].name).label} [{each[0].unit or '−'}]")
         counted = " and ".join(str(of.arms) for of in each if of.arms < found.done)
@@ -113,9 +123,12 @@ def key_label(key: str, found: Study) -> str:
 
 def _shown(found: Study, quantity: str | None = None) -> tuple[list[Spread], list[str]]:
     """Quantities up, of both loops the sampled one, and numbers along the axes: those that drive most first."""
-    rows = [each[-1] for each in distributions(found, quantity, MOST_ROWS)]
+    # of a scatter picture: axes, and arms
+    most_numbers = 4
+    most_rows = 3
+    rows = [each[-1] for each in distributions(found, quantity, most_rows)]
     drivers = [each.driver for each in rows]
-    return rows, sorted(found.parts.plan.space.keys, key=drivers.count, reverse=True)[:MOST_NUMBERS]
+    return rows, sorted(found.parts.plan.space.keys, key=drivers.count, reverse=True)[:most_numbers]
 
 
 @picture(
@@ -157,7 +170,9 @@ def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axe
                             label=word or "not determined",
                         )
             one.set(xlabel=_folded(key_label(key, found)) * one.xaxis.get_tick_params()["labelbottom"])
-            one.set(ylabel=_folded(f"{of.label} [{of.unit or '−'}]") * one.yaxis.get_tick_params()["labelleft"])
+            one.set(
+                ylabel=_folded(f"{of.label} [{of.unit or '−'}]") * one.yaxis.get_tick_params()["labelleft"]
+            )
             one.xaxis.set_major_locator(MaxNLocator(4))
             plain_ticks(one.xaxis)
 
@@ -165,7 +180,9 @@ def study_scatter(found: Study, quantity: str | None = None, *, ax: Sequence[Axe
 @picture(
     (Study, "tfarm.study returns"),
     size=(9.0, 4.6),
-    title=lambda found, output="root_moment": f"{found.arm}: {signal_words(output)[0]} of the arms of a study",
+    title=lambda found, output="root_moment": (
+        f"{found.arm}: {signal_words(output)[0]} of the arms of a study"
+    ),
 )
 def study_band(found: Study, output: str = "root_moment", *, ax: Axes) -> None:
     """Exact responses of up to 100 arms of a study (from `tfarm.study`), their 5, 50 and 95 % at each frequency.
@@ -175,7 +192,13 @@ def study_band(found: Study, output: str = "root_moment", *, ax: Axes) -> None:
     band = found.band(output)
     omega = band.omega
     ax.fill_between(
-        omega, band.low, band.high, color=BLUE, alpha=0.3, lw=0, label="5 to 95 % of the arms, at each frequency"
+        omega,
+        band.low,
+        band.high,
+        color=BLUE,
+        alpha=0.3,
+        lw=0,
+        label="5 to 95 % of the arms, at each frequency",
     )
     # a dozen single arms at least
     for n, curve in enumerate(band.curves[:: max(1, len(band.curves) // 12)]):

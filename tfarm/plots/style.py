@@ -26,7 +26,9 @@ from matplotlib.axes import Axes as Axes
 from matplotlib.axis import Axis
 from matplotlib.backend_bases import FigureCanvasBase
 from matplotlib.backends.backend_agg import RendererAgg
-from matplotlib.figure import Figure as Figure  # which pages name too
+
+# which pages name too
+from matplotlib.figure import Figure as Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation, Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -48,7 +50,8 @@ BLUE = "#0060a8"
 ORANGE = "#c4500a"
 GREEN = "#00795a"
 PURPLE = "#8a3b8f"
-COLOURS = (BLUE, ORANGE, GREEN, PURPLE)  # of several records in one picture
+# of several records in one picture
+COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
 # stability, the same in every picture, page and live view; each has a mark of its own too, for grey print
 STABLE = BLUE
 MARGINAL = PURPLE
@@ -59,25 +62,30 @@ REGIONS = ("#dcecf9", "#f9cfc0", "#f2ad9b", "#e58a76", "#d46c5a")
 GOOD = GREEN
 LOW = "#735200"
 POOR = ORANGE
-OTHER_UNITS = ARM_PARAMETERS | {"delay": "s"}  # of numbers that vary
+# of numbers that vary
+OTHER_UNITS = ARM_PARAMETERS | {"delay": "s"}
 
 METADATA: dict[str, dict[str, str | None]] = {
     "svg": {"Date": None, "Creator": "tfarm"},
     "png": {"Software": "tfarm"},
     "pdf": {"Creator": "tfarm", "Producer": None, "CreationDate": None},
 }
-PICTURE_DOTS = 160  # an inch, of a PNG: lines of 0.6 points are more than a pixel wide
+# an inch, of a PNG: lines of 0.6 points are more than a pixel wide
+PICTURE_DOTS = 160
 # inches at 96 pixels: half a page that is 1280 wide, and one that is 400
 HALF_WIDTH = 6.2
 PHONE_WIDTH = 3.83
-SMALL_POINTS = 6.5  # largest letters inside axes
+# largest letters inside axes
+SMALL_POINTS = 6.5
 _place: ContextVar[str] = ContextVar("_place", default="")
 
 
 def style() -> AbstractContextManager[None]:
     """The style of pictures, whatever the user's own settings are."""
     names = ("tfarm", _place.get()) if _place.get() in ("column", "phone") else ("tfarm",)
-    return matplotlib.style.context(["default", *(Path(__file__).with_name(f"{name}.mplstyle") for name in names)])
+    return matplotlib.style.context(
+        ["default", *(Path(__file__).with_name(f"{name}.mplstyle") for name in names)]
+    )
 
 
 @contextmanager
@@ -122,7 +130,8 @@ def renderer_of(dpi: float) -> RendererAgg:
     return RendererAgg(1.0, 1.0, dpi)  # type: ignore[no-untyped-call]
 
 
-FIGURES: dict[Any, Callable[..., Figure]] = {}  # by the class of a record its first picture as a figure of its own
+# by the class of a record its first picture as a figure of its own
+FIGURES: dict[Any, Callable[..., Figure]] = {}
 
 
 def check_records(of: Sequence[tuple[Any, str]], found: Sequence[Any]) -> None:
@@ -177,7 +186,8 @@ class Drawing:
         """Draw checked records in the axes given, or in a figure of pyplot; return the axes."""
         check_records(self.of, found)
         if ax is None:
-            from matplotlib import pyplot  # not needed, and not loaded, for a page
+            # not needed, and not loaded, for a page
+            from matplotlib import pyplot
 
             # loads the backend here: inside a style, the mode of a notebook's would be reset
             pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]
@@ -250,7 +260,9 @@ def placed_size(inches: tuple[float, float], is_grid: bool) -> tuple[float, floa
 def stack(figure: Figure) -> None:
     """Put axes that are side by side below each other, on a phone: each as wide as the picture."""
     boxes = [ax.get_position() for ax in figure.axes]
-    shares = [min(0.7, box.height * figure.get_figheight() / (box.width * figure.get_figwidth())) for box in boxes]
+    shares = [
+        min(0.7, box.height * figure.get_figheight() / (box.width * figure.get_figwidth())) for box in boxes
+    ]
     figure.clear()
     figure.set_figheight(sum(PHONE_WIDTH * share + 0.3 for share in shares))
     figure.subplots(len(shares), height_ratios=shares, squeeze=False)
@@ -275,7 +287,8 @@ def finish(drawn: Figure, words: str) -> None:
     for ax in drawn.axes if place else ():
         for text in (each for each in (*ax.get_children(), ax.xaxis.label) if isinstance(each, Text)):
             text.set_text(folded(text.get_text(), 46))
-        if len(drawn.axes) > 1 and len(label := ax.get_ylabel()) > 14:  # axes that share the height
+        # axes that share the height
+        if len(drawn.axes) > 1 and len(label := ax.get_ylabel()) > 14:
             ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label))
     for ax in drawn.axes if place == "phone" else ():
         for each in (ax, *ax.child_axes):
@@ -321,17 +334,27 @@ def folded(text: str, letters: int) -> str:
     return "\n".join(textwrap.fill(line, letters) for line in text.splitlines())
 
 
-def note(text: str, at: tuple[float, float], ax: Axes, room: tuple[float, float] = (0.08, 0.045), **looks: Any) -> bool:
+def note(
+    text: str, at: tuple[float, float], ax: Axes, room: tuple[float, float] = (0.08, 0.045), **looks: Any
+) -> bool:
     """Write a text with a halo where the room around it, of the width and the height, is free of other notes.
 
     Return whether it is.
     """
     to_view = ax.transData - ax.transAxes
-    others = [to_view.transform(each.xy) for each in ax.texts if isinstance(each, Annotation) and each.get_text()]
+    others = [
+        to_view.transform(each.xy) for each in ax.texts if isinstance(each, Annotation) and each.get_text()
+    ]
     needed = np.multiply(1.6 if _place.get() == "phone" else 1.0, room)
     is_free = bool((abs(np.reshape(others, (-1, 2)) - to_view.transform(at)) > needed).any(axis=1).all())
     if is_free:
-        own: Any = {"fontsize": 8.0, "textcoords": "offset points", "xytext": (0, 0), "va": "center", "zorder": 5}
+        own: Any = {
+            "fontsize": 8.0,
+            "textcoords": "offset points",
+            "xytext": (0, 0),
+            "va": "center",
+            "zorder": 5,
+        }
         halo = [withStroke(linewidth=3.0, foreground="white")]
         ax.annotate(text, at, annotation_clip=False, path_effects=halo, **own | looks)
     return is_free
@@ -357,7 +380,8 @@ def plain_ticks(axis: Axis, digits: int = 3, subs: Sequence[float] = (1.0,)) -> 
 
 def law_words(law: Law) -> str:
     """A controller by its name, where it has one of its own."""
-    return "the controller" if law.name == "law" else law.name  # which is that of one without a name
+    # which is that of one without a name
+    return "the controller" if law.name == "law" else law.name
 
 
 def gains_words(law: Law, digits: int = 4, but: str = "") -> str:
@@ -365,7 +389,8 @@ def gains_words(law: Law, digits: int = 4, but: str = "") -> str:
     gains = law.gains
     if gains is None:
         return f"{law_words(law)}, of {', '.join(law.signals)}"
-    named = [gain.name for gain in LISTED if gains[gain.name] or gain.output != "hub_angle"]  # beyond the paper's law
+    # beyond the paper's law
+    named = [gain.name for gain in LISTED if gains[gain.name] or gain.output != "hub_angle"]
     return ", ".join(f"{name} = {plain(gains[name], digits)}" for name in named if name != but)
 
 
@@ -447,7 +472,8 @@ def settled(figure: Figure) -> None:
             measure_once(ax)
         layout.execute(figure)
         figure.set_layout_engine(None)
-    for ax in figure.axes:  # at ten digits: the layout's solver orders by address, so its last bit differs
+    # at ten digits: the layout's solver orders by address, so its last bit differs
+    for ax in figure.axes:
         ax.set_position(tuple(np.round(ax.get_position(original=True).bounds, 10).tolist()))
 
 
@@ -464,7 +490,8 @@ def measure_once(ax: Axes) -> None:
         if place is None or next(rounds):
             with ticks_kept([ax]):
                 return type(ax).get_tightbbox(ax, *how, **more)
-        guess = [-0.65, -0.5 if place.is_last_row() else -0.05, 0.1, 0.25]  # inches
+        # inches
+        guess = [-0.65, -0.5 if place.is_last_row() else -0.05, 0.1, 0.25]
         inner = ax.get_position(original=True).transformed(ax.figure.transSubfigure)
         return Bbox.from_extents(*(inner.extents + ax.figure.dpi * np.array(guess)))
 
@@ -478,7 +505,8 @@ def ticks_kept(axes: Sequence[Axes]) -> Iterator[None]:
     matplotlib finds them anew for each spine, label and title, ten times in a drawing.
     """
     both = [axis for ax in axes for each in (ax, *ax.child_axes) for axis in (each.xaxis, each.yaxis)]
-    kept = [*product(both, ("_update_ticks", "_get_ticklabel_bboxes"))]  # names of matplotlib's own
+    # names of matplotlib's own
+    kept = [*product(both, ("_update_ticks", "_get_ticklabel_bboxes"))]
     for axis, name in kept:
         setattr(axis, name, once(getattr(axis, name)))
     try:

@@ -30,18 +30,21 @@ from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.exact.series import constant_of, without_slow_pole
 from tfarm.exact.system import System
 from tfarm.exact.values import evaluate_outputs, free_slopes
+from tfarm.reduced.partial_fractions import PartialFractions
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.response.signals import Signals
 from tfarm.spectrum import Modes, modes
 from tfarm.spectrum.damped import damped_modes, missing_real_eigenvalues
 from tfarm.spectrum.naming import single_zeros
 
-from .partial_fractions import PartialFractions
-
-CORNER_RATIOS = 1 + np.geomspace(0.02, 30.0, 14)  # c_j C, and below s C of the fit: tuned by hand on the lab arm
-SLOW_PAIRS = CORNER_RATIOS.size // 2  # the corners, two a pair
-FITTED_AT = np.geomspace(0.02, 5.0, 60)  # s C at which they are fitted: tuned with CORNER_RATIOS
-SLOW_POLES_FROM = 1.2  # C w of the last mode, at least: below, the omitted modes are not overdamped
+# c_j C, and below s C of the fit: tuned by hand on the lab arm
+CORNER_RATIOS = 1 + np.geomspace(0.02, 30.0, 14)
+# the corners, two a pair
+SLOW_PAIRS = CORNER_RATIOS.size // 2
+# s C at which they are fitted: tuned with CORNER_RATIOS
+FITTED_AT = np.geomspace(0.02, 5.0, 60)
+# C w of the last mode, at least: below, the omitted modes are not overdamped
+SLOW_POLES_FROM = 1.2
 
 
 def slow_remainder(C: float, missing: Callable[[Complex], Complex]) -> tuple[Real, Real]:
@@ -68,7 +71,9 @@ def powers_of(wanted: Sequence[Output]) -> NDArray[np.int64]:
     return np.array([[each.power] for each in wanted])
 
 
-def end_residues(k: System, wanted: Sequence[Output], p: Complex, x: float = 0.0) -> tuple[Complex, NDArray[np.bool_]]:
+def end_residues(
+    k: System, wanted: Sequence[Output], p: Complex, x: float = 0.0
+) -> tuple[Complex, NDArray[np.bool_]]:
     """Return residues N(p)/D'(p) (outputs, p) at eigenvalues p, and where they are doubtful.
 
     There A theta = B M on the hub (see `tfarm.exact.system`); the one with the larger factor has lost digits.
@@ -112,13 +117,17 @@ def contour_residues(k: System, wanted: Sequence[Output], p: Complex, known: Com
 def _must_be_apart(p: Complex) -> None:
     """Raise ConvergenceError for the first of some eigenvalues."""
     for worst in p.tolist():
-        raise ConvergenceError(f"no residue at the eigenvalue {worst:.10g} 1/s: another one is too close", worst, 0.0)
+        raise ConvergenceError(
+            f"no residue at the eigenvalue {worst:.10g} 1/s: another one is too close", worst, 0.0
+        )
 
 
-MOST_MODELLED = 1000  # of a model: its matrices of 2000 states take 32 MB
+# of a model: its matrices of 2000 states take 32 MB
+MOST_MODELLED = 1000
 
 
-ModalModel = PartialFractions  # pairs assigned to no mode come last, with the index 0 and |s| for a frequency
+# pairs assigned to no mode come last, with the index 0 and |s| for a frequency
+ModalModel = PartialFractions
 
 
 def modal_model(
@@ -199,7 +208,9 @@ def slow_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) ->
     exact = transfer(arm, outputs, x=x)
     corners, shares = slow_remainder(C, lambda s: exact(s).reshape(-1, s.size) - model(s))
     residues = (shares * corners).reshape(len(shares), -1, 2)
-    return model.with_pairs(-corners.reshape(-1, 2), residues, model.static - shares.sum(axis=1), np.zeros(SLOW_PAIRS))
+    return model.with_pairs(
+        -corners.reshape(-1, 2), residues, model.static - shares.sum(axis=1), np.zeros(SLOW_PAIRS)
+    )
 
 
 def _at_rest(G: TransferFunction, single: Real, table: Modes) -> tuple[Real, NDArray[np.bool_]]:
@@ -256,7 +267,8 @@ def _residues(
     return residues, alone.real.astype(float)
 
 
-ALGEBRAIC = 1e-9  # distance from -1 of a feedthrough of the loop that leaves its input undetermined
+# distance from -1 of a feedthrough of the loop that leaves its input undetermined
+ALGEBRAIC = 1e-9
 
 
 def sensed_model(arm: Arm, signals: Sequence[str], count: int) -> Matrices:

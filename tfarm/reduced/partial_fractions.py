@@ -144,7 +144,9 @@ class PartialFractions:
     def first(self, count: int) -> PartialFractions:
         """Return the model with the first `count` of the arm's modes, the static gains of the others in `static`."""
         beyond = self.index > count
-        beyond |= (self.index == 0) & (self.natural_frequency > self.natural_frequency[beyond].min(initial=np.inf))
+        beyond |= (self.index == 0) & (
+            self.natural_frequency > self.natural_frequency[beyond].min(initial=np.inf)
+        )
         kept = ~beyond
         return replace(
             self,
@@ -156,7 +158,9 @@ class PartialFractions:
             participation=self.participation[kept],
         )
 
-    def with_pairs(self, p: Real | Complex, residues: Real | Complex, static: Real, share: Real) -> PartialFractions:
+    def with_pairs(
+        self, p: Real | Complex, residues: Real | Complex, static: Real, share: Real
+    ) -> PartialFractions:
         """Return the model with more pairs of poles (n, 2), the tails, and their share of the input (n,)."""
         return replace(
             self,
@@ -188,10 +192,12 @@ class PartialFractions:
         )
 
 
-FOUND_TO_WORST = 1.02  # times the largest error found: tuned on random arms
-EXACT_ROUNDING = 1e-14  # error of the exact values in the same norm
-CLEAR_OF_POLES = 1e-12  # of a frequency: the least distance of a sample from a pole
-REFINED_POINTS = 17  # of a peak of the error: a refinement is to an eighth of its width
+# times the largest error found: tuned on random arms
+FOUND_TO_WORST = 1.02
+# error of the exact values in the same norm
+EXACT_ROUNDING = 1e-14
+# of a frequency: the least distance of a sample from a pole
+CLEAR_OF_POLES = 1e-12
 
 
 class Ruler:
@@ -213,13 +219,15 @@ class Ruler:
 
     def measure(self, model: PartialFractions) -> tuple[Real, Real]:
         """Return the largest error of each output, with a margin, and its frequency [rad/s]; high peaks are refined."""
+        # of a peak of the error: a refinement is to an eighth of its width
+        refined_points = 17
         errors = _errors(model, self.w, *self._exact)
         worst = errors.max(axis=1)
         at = self.w[errors.argmax(axis=1)]
         for row, error in enumerate(errors):
             low, high = self._brackets(error)
             for _ in range(3):
-                inner = np.linspace(low, high, REFINED_POINTS)
+                inner = np.linspace(low, high, refined_points)
                 found = np.zeros(inner.shape)
                 clear = self._is_clear(inner)
                 found[clear] = _errors(model, inner[clear], *values_and_norm(self.G, inner[clear]))[row]
@@ -227,7 +235,7 @@ class Ruler:
                 if found[best] > worst[row]:
                     worst[row] = found[best]
                     at[row] = inner[best]
-                around = np.clip(np.add(found.argmax(axis=0), [[-1], [1]]), 0, REFINED_POINTS - 1)
+                around = np.clip(np.add(found.argmax(axis=0), [[-1], [1]]), 0, refined_points - 1)
                 low, high = np.take_along_axis(inner, around, axis=0)
         return worst * FOUND_TO_WORST + EXACT_ROUNDING, at
 

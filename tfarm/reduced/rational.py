@@ -20,11 +20,10 @@ from tfarm.arm import Arm
 from tfarm.arrays import Real
 from tfarm.errors import require
 from tfarm.exact.series import expansion_at_zero
+from tfarm.reduced.modal import MOST_MODELLED, modal_model, powers_of
+from tfarm.reduced.partial_fractions import PartialFractions, distance, frequencies_around, values_and_norm
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes_below
-
-from .modal import MOST_MODELLED, modal_model, powers_of
-from .partial_fractions import PartialFractions, distance, frequencies_around, values_and_norm
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,9 @@ def modes_in(arm: Arm, high: float) -> int:
     """Return the number of exact modes of a model up to `high` [rad/s].  Raises ParameterError over 1000."""
     # 1.02 times the end of the range: up to there modes are exact
     count = modes_below(arm, 1.02 * high)
-    require(count <= MOST_MODELLED, "band", high, f"{count} modes lie below it, over {MOST_MODELLED}; lower it")
+    require(
+        count <= MOST_MODELLED, "band", high, f"{count} modes lie below it, over {MOST_MODELLED}; lower it"
+    )
     return count
 
 
@@ -55,7 +56,9 @@ def has_rational(arm: Arm) -> bool:
     return arm.is_undamped and not arm.input_lags
 
 
-def rational_model(arm: Arm, outputs: Wanted, pairs: int, high: float, x: float | None = None) -> PartialFractions:
+def rational_model(
+    arm: Arm, outputs: Wanted, pairs: int, high: float, x: float | None = None
+) -> PartialFractions:
     """Return the lossless model of `pairs` pairs of poles: modes below `high` [rad/s] exactly, the rest by AAA.
 
     Pairs that would fit rounding become more exact modes.  There are fewer pairs where too few poles pass the checks.
@@ -99,14 +102,18 @@ def _remainders(G: TransferFunction, inside: PartialFractions, high: float, freq
     by_S = ((at_zero[:, 0] != 0) | (power[:, 0] > 0))[:, None]
     square = inside.natural_frequency**2
     p = inside.eigenvalues[:, 0]
-    r = (inside.residues[..., 0] * 2 * p / p**power).real  # of each output over its power of s, in the variable S
+    # of each output over its power of s, in the variable S
+    r = (inside.residues[..., 0] * 2 * p / p**power).real
     values, size = values_and_norm(G, w)
     base = (values / (1j * w) ** power).real
     shared = 1 / (S + square[:, None])
-    F = np.where(by_S, base * S - at_zero[:, :1] - (r @ shared) * S, base - at_zero[:, 2:3] + (r / square @ shared) * S)
+    F = np.where(
+        by_S, base * S - at_zero[:, :1] - (r @ shared) * S, base - at_zero[:, 2:3] + (r / square @ shared) * S
+    )
     weight = np.divide(w**power, size, out=np.zeros_like(size), where=size > 0) / np.where(by_S, abs(S), 1.0)
     kinds = [(each.quantity, each.place, kind) for each, kind in zip(bases, by_S[:, 0], strict=True)]
-    for kind in set(kinds):  # one fit for powers of s of one quantity: the rate stays that of the angle
+    # one fit for powers of s of one quantity: the rate stays that of the angle
+    for kind in set(kinds):
         same = [row for row, other in enumerate(kinds) if other == kind]
         F[same], weight[same] = F[same[0]], weight[same].max(axis=0)
     beyond = max(high, inside.natural_frequency.max(initial=0.0))
@@ -197,7 +204,10 @@ def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares:
     added = np.stack([upper, upper.conj()], axis=2)
     ends = np.stack([s, s.conj()], axis=1)
     static = inside.static + (added / ends).real.sum(axis=(1, 2))
-    strict = rest.by_S & (power[:, 0] < 2)  # the poles above replace the static remainder
+    # the poles above replace the static remainder
+    strict = rest.by_S & (power[:, 0] < 2)
     model = inside.with_pairs(ends, added, np.where(strict, 0.0, static), np.sqrt(abs(in_S[0])))
-    own = {name: getattr(model, name)[1:] for name in ("rows", "residues", "rigid", "static", "single_residues")}
+    own = {
+        name: getattr(model, name)[1:] for name in ("rows", "residues", "rigid", "static", "single_residues")
+    }
     return replace(model, **own)

@@ -19,28 +19,27 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import MISSING, ConvergenceError, require
 from tfarm.exact.outputs import Output
 from tfarm.records import frozen
+from tfarm.reduced.modal import SLOW_PAIRS, SLOW_POLES_FROM, modal_model, relaxed_model, slow_model
+from tfarm.reduced.partial_fractions import EXACT_ROUNDING, PartialFractions, Ruler
+from tfarm.reduced.rational import has_rational, modes_in, rational_model
 from tfarm.response import Wanted, transfer
 from tfarm.response.frequency import known_band
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
-
-from .modal import SLOW_PAIRS, SLOW_POLES_FROM, modal_model, relaxed_model, slow_model
-from .partial_fractions import (
-    EXACT_ROUNDING,
-    PartialFractions,
-    Ruler,
-)
-from .rational import has_rational, modes_in, rational_model
 
 if TYPE_CHECKING:
     import control
 
 Reduction = Literal["modal", "aaa"]
 
-BAND = (0.1, 1000.0)  # rad/s, by default
-NORM = "|dG| / (|G| + |w dG/dw|)"  # of the printed errors
-MOST_STATES = 400  # of a model within an error
-MOST_TAILS = 12  # pairs of poles above the range: more would fit rounding
+# rad/s, by default
+BAND = (0.1, 1000.0)
+# of the printed errors
+NORM = "|dG| / (|G| + |w dG/dw|)"
+# of a model within an error
+MOST_STATES = 400
+# pairs of poles above the range: more would fit rounding
+MOST_TAILS = 12
 
 
 class Channel(NamedTuple):
@@ -63,9 +62,12 @@ class ReducedModel:
     """
 
     model: PartialFractions
-    method: Annotated[Reduction, Quantity("method", help="truncated modal series, or rational approximation (AAA)")]
+    method: Annotated[
+        Reduction, Quantity("method", help="truncated modal series, or rational approximation (AAA)")
+    ]
     band: Annotated[
-        tuple[float, float], Quantity("frequency range", "rad/s", help="in which the error is known", key="range_rad_s")
+        tuple[float, float],
+        Quantity("frequency range", "rad/s", help="in which the error is known", key="range_rad_s"),
     ]
     errors: Real
     worst_at: Real
@@ -75,7 +77,11 @@ class ReducedModel:
     lacking_frequency: Annotated[
         float,
         Quantity(
-            "its frequency", "rad/s", 10, "natural frequency of that mode, undamped", key="first_mode_lacking_rad_s"
+            "its frequency",
+            "rad/s",
+            10,
+            "natural frequency of that mode, undamped",
+            key="first_mode_lacking_rad_s",
         ),
     ]
     note: Annotated[str, Quantity("note", help="deviation from the requested order or method")] = ""
@@ -86,12 +92,16 @@ class ReducedModel:
         return self.arm.name
 
     @property
-    def error_norm(self) -> Annotated[str, Quantity("error norm", help="norm of the error at each frequency")]:
+    def error_norm(
+        self,
+    ) -> Annotated[str, Quantity("error norm", help="norm of the error at each frequency")]:
         """The norm of `errors`."""
         return NORM
 
     @property
-    def channels(self) -> Annotated[list[Channel], Quantity("outputs", help="each with its error", key="channels")]:
+    def channels(
+        self,
+    ) -> Annotated[list[Channel], Quantity("outputs", help="each with its error", key="channels")]:
         """A row an output."""
         G = transfer(self.arm, self.model.rows, x=self.model.x)
         rows = zip(self.model.outputs, G.units, self.errors.tolist(), self.worst_at.tolist(), strict=True)
@@ -118,12 +128,16 @@ class ReducedModel:
         return self.model.states
 
     @property
-    def named_matrices(self) -> Annotated[dict[str, Real], Quantity(help="matrix of the state space", flat=True)]:
+    def named_matrices(
+        self,
+    ) -> Annotated[dict[str, Real], Quantity(help="matrix of the state space", flat=True)]:
         """A, B, C and D by their names."""
         return dict(zip("ABCD", self.matrices(), strict=True))
 
     @property
-    def worst_error(self) -> Annotated[float, Quantity("worst error", digits=3, help="largest of all outputs")]:
+    def worst_error(
+        self,
+    ) -> Annotated[float, Quantity("worst error", digits=3, help="largest of all outputs")]:
         """The largest of `errors`."""
         return float(self.errors.max())
 
@@ -201,12 +215,18 @@ class _Bench:
     """Models of one arm over one frequency range, with their errors."""
 
     def __init__(
-        self, arm: Arm, rows: tuple[Output, ...], band: tuple[float, float], x: float | None, method: Reduction | None
+        self,
+        arm: Arm,
+        rows: tuple[Output, ...],
+        band: tuple[float, float],
+        x: float | None,
+        method: Reduction | None,
     ) -> None:
         self.arm, self.rows, self.band, self.x = arm, rows, band, x
         self.fixed = modal_model(arm, rows, 0, x).order
         self.inside = modes_in(arm, band[1])
-        self.most = (MOST_STATES - self.fixed) // 2  # pairs of poles
+        # pairs of poles
+        self.most = (MOST_STATES - self.fixed) // 2
         self.by_modes = method != "aaa"
         self.by_aaa = method != "modal" and has_rational(arm)
         self.ruler = Ruler(arm, rows, band, x)
@@ -220,13 +240,23 @@ class _Bench:
         found: list[ReducedModel] = []
         if self.by_aaa and pairs > self.inside:
             model = rational_model(*of, pairs, self.band[1], self.x)
-            few = "" if model.order == order else f"order below {order}: no more poles passed the checks of AAA"
+            few = (
+                "" if model.order == order else f"order below {order}: no more poles passed the checks of AAA"
+            )
             found.append(self._measured(model, "aaa", few))
         if self.by_modes or not found:
-            note = "" if self.by_modes else f"method modal: AAA needs more than the {self.inside} modes in the range"
+            note = (
+                ""
+                if self.by_modes
+                else f"method modal: AAA needs more than the {self.inside} modes in the range"
+            )
             found.append(self._measured(modal_model(*of, pairs, self.x), "modal", note))
-            less = pairs - SLOW_PAIRS  # modes: slow poles replace omitted ones that are overdamped
-            if less >= 1 and self.arm.damping * modes(self.arm, less).natural_frequency[-1] >= SLOW_POLES_FROM:
+            # modes: slow poles replace omitted ones that are overdamped
+            less = pairs - SLOW_PAIRS
+            if (
+                less >= 1
+                and self.arm.damping * modes(self.arm, less).natural_frequency[-1] >= SLOW_POLES_FROM
+            ):
                 found.append(self._measured(slow_model(*of, less, self.x), "modal"))
         return min(found, key=lambda each: each.worst_error)
 
@@ -256,11 +286,15 @@ class _Bench:
         models = (rational_model(self.arm, self.rows, pairs, self.band[1], self.x) for pairs in sizes)
         return self._first_within(error, models, "aaa")
 
-    def _first_within(self, error: float, models: Iterable[PartialFractions], method: Reduction) -> list[ReducedModel]:
+    def _first_within(
+        self, error: float, models: Iterable[PartialFractions], method: Reduction
+    ) -> list[ReducedModel]:
         measured = (self._measured(model, method) for model in models if self.ruler.rough(model) <= error)
         return list(islice((each for each in measured if each.worst_error <= error), 1))
 
-    def _few_modes(self, error: float, make: Callable[..., PartialFractions], most: int) -> list[ReducedModel]:
+    def _few_modes(
+        self, error: float, make: Callable[..., PartialFractions], most: int
+    ) -> list[ReducedModel]:
         """Return the smallest model of up to `most` modes within an error, if any.  By bisection, as errors fall."""
 
         def rough(count: int) -> float:
@@ -268,7 +302,8 @@ class _Bench:
 
         good = 0
         bad = -1
-        sizes: list[float] = []  # of the errors with more and more modes beyond those of the range
+        # of the errors with more and more modes beyond those of the range
+        sizes: list[float] = []
         try:
             while (size := rough(good)) > error:
                 sizes += [size] * (good > self.inside)
@@ -276,24 +311,31 @@ class _Bench:
                 if good == most or (len(sizes) > 2 and sizes[-1] > 0.5 * sizes[-3]):
                     return []
                 good, bad = min(good + max(good // 2, 2), most), good
-        except ConvergenceError:  # at C > 0 no more damped modes can be separated
+        except ConvergenceError:
+            # at C > 0 no more damped modes can be separated
             return []
         while good - bad > 1:
             middle = (good + bad) // 2
             good, bad = (middle, bad) if rough(middle) <= error else (good, middle)
         # 3: numbers of modes, from that of the rough error on, whose error is computed in full
         counts = range(good, min(good + 3, most + 1))
-        return self._first_within(error, (make(self.arm, self.rows, count, self.x) for count in counts), "modal")
+        return self._first_within(
+            error, (make(self.arm, self.rows, count, self.x) for count in counts), "modal"
+        )
 
     def _measured(self, model: PartialFractions, method: Reduction, note: str = "") -> ReducedModel:
-        return ReducedModel(model, method, self.band, *self.ruler.measure(model), *first_mode_lacking(model), note)
+        return ReducedModel(
+            model, method, self.band, *self.ruler.measure(model), *first_mode_lacking(model), note
+        )
 
     def _pairs(self, order: object) -> int:
         """Return the number of flexible pairs of poles in a model of that order."""
         rigid = {0: "", 2: "two for the rigid body, "}.get(self.fixed, f"{self.fixed} other than the modes, ")
         remedy = f"states come in pairs, {rigid}two a mode: an even number from 2 to {MOST_STATES}"
         if not self.arm.is_undamped:
-            remedy = f"two states a mode, {rigid}and one for relaxation where it is odd: from 2 to {MOST_STATES}"
+            remedy = (
+                f"two states a mode, {rigid}and one for relaxation where it is odd: from 2 to {MOST_STATES}"
+            )
         order = whole("order", order, 2, MOST_STATES, remedy)
         require(order % 2 == 0 or self.arm.damping or not self.arm.is_uniform, "order", order, remedy)
         return (order - self.fixed) // 2

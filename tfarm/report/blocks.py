@@ -29,9 +29,11 @@ TEMPLATES = Path(__file__).parent / "templates"
 # folders in that of an arm
 PICTURES = "pictures"
 DATA = "data"
-DRAWN_DIGITS = 7  # of the numbers of a picture in its file: a hundredth of the width of a line is four
+# of the numbers of a picture in its file: a hundredth of the width of a line is four
+DRAWN_DIGITS = 7
 T = TypeVar("T")
-PART = "\ue000"  # between title and caption, which no name has in it
+# between title and caption, which no name has in it
+PART = "\ue000"
 PROMISES = (
     "certified",
     "complete",
@@ -161,7 +163,9 @@ def picture(
 ) -> Picture:
     """A picture with title, caption, alternative text and line of Python of its kind; `stem` names its files."""
     title, caption, alt, *python = _parts(kind, values)
-    return Picture(stem or kind.replace("_", "-"), title, caption, alt, figure, _columns(data), "".join(python))
+    return Picture(
+        stem or kind.replace("_", "-"), title, caption, alt, figure, _columns(data), "".join(python)
+    )
 
 
 def sheet(kind: str, columns: Table | Iterable[Column], /, *, stem: str = "", **values: Any) -> Table:
@@ -213,7 +217,9 @@ def save_section(section: PageSection, folder: Path, is_paper: bool = False) -> 
         (folder / name).mkdir(exist_ok=True)
     return replace(
         section,
-        blocks=[save_block(block, folder, is_paper) for block in section.blocks if getattr(block, "columns", True)],
+        blocks=[
+            save_block(block, folder, is_paper) for block in section.blocks if getattr(block, "columns", True)
+        ],
     )
 
 
@@ -243,12 +249,16 @@ def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> 
         (folder / files[-1]).write_bytes(block.film)
     if block.data:
         columns = tuple(
-            replace(each, of=[kept_digits((x,), DRAWN_DIGITS)[0] if isinstance(x, float) else x for x in each.of])
+            replace(
+                each, of=[kept_digits((x,), DRAWN_DIGITS)[0] if isinstance(x, float) else x for x in each.of]
+            )
             for each in block.data
         )
         saved = save_table(Table(columns=columns, stem=f"{block.stem}-data"), folder / DATA, ("csv",))
         files += [f"{DATA}/{name}" for name in saved]
-    return SavedBlock(block.stem, block.title, shape.picture(block, files, narrow), shape.image(block, narrow))
+    return SavedBlock(
+        block.stem, block.title, shape.picture(block, files, narrow), shape.image(block, narrow)
+    )
 
 
 def explain_commands(text: str, words: str = "") -> Markup:
@@ -289,6 +299,8 @@ def kept_in(folder: Path, kind: str, record: type[T]) -> T | None:
 
 def read_records(out: Path, kind: str, record: type[T]) -> dict[Path, T]:
     """The records of that kind in the folders of arms, by folder; what is none of ours is passed over."""
-    folders = sorted((f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name)
+    folders = sorted(
+        (f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name
+    )
     found = {folder: each for folder in folders if (each := kept_in(folder, kind, record)) is not None}
     return {folder: each for folder, each in found.items() if getattr(each, "name", "") == folder.name}

@@ -24,8 +24,8 @@ from tfarm.report.page import ArmReport, GivenLaw, has_loop, is_preset, sign_wor
 LIVE_PAGE = "live.html"
 ASSETS = "assets"
 SCRIPT = "live.js"
-SCRIPTS = "script-src 'self'"  # in the policy of a page, from the folder of its script
-MOST_PARTS = 4  # of a law: |L| beyond the frequency range is bounded at all 2^n corners of their ranges
+# in the policy of a page, from the folder of its script
+SCRIPTS = "script-src 'self'"
 
 
 def is_live(report: ArmReport) -> bool:
@@ -35,9 +35,11 @@ def is_live(report: ArmReport) -> bool:
 
 def has_sliders(law: Law) -> bool:
     """Whether a page can have a slider for each part of a law: gains at the hub, or few rational parts in s."""
+    # of a law: |L| beyond the frequency range is bounded at all 2^n corners of their ranges
+    most_parts = 4
     return (
         not law.is_discrete
-        and len(law.part_gains) == len(law.parts) <= MOST_PARTS
+        and len(law.part_gains) == len(law.parts) <= most_parts
         and all(hasattr(part.block, "num") for part in law.parts)
     )
 
@@ -59,7 +61,14 @@ def save_live(report: ArmReport, folder: Path) -> None:
         return
     data = {"name": arm.name, "command_name": argument(arm.name, is_preset(arm, report.chain)), **numbers}
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
-    colours = {"stable": STABLE, "marginal": MARGINAL, "unstable": UNSTABLE, "good": GOOD, "low": LOW, "poor": POOR}
+    colours = {
+        "stable": STABLE,
+        "marginal": MARGINAL,
+        "unstable": UNSTABLE,
+        "good": GOOD,
+        "low": LOW,
+        "poor": POOR,
+    }
     page = render(
         "live.html",
         title=title,
@@ -76,7 +85,10 @@ def save_live(report: ArmReport, folder: Path) -> None:
     styles = " ".join(_source(each) for each in re.findall("<style>(.*?)</style>", page, re.DOTALL))
     policy = f"default-src 'none'; base-uri 'none'; form-action 'none'; style-src {styles}; {SCRIPTS}"
     first = '<meta charset="utf-8">'
-    write_text(out, page.replace(first, f'{first}\n<meta http-equiv="Content-Security-Policy" content="{policy}">', 1))
+    write_text(
+        out,
+        page.replace(first, f'{first}\n<meta http-equiv="Content-Security-Policy" content="{policy}">', 1),
+    )
 
 
 def _source(text: str) -> str:
@@ -108,7 +120,8 @@ class LivePage:
         script = (self.path.parents[1] / ASSETS / SCRIPT).read_text(encoding="utf-8")
         page = self.path.read_text(encoding="utf-8").replace(SCRIPTS, f"script-src {_source(script)}", 1)
         page = page.replace(f'<script src="../{ASSETS}/{SCRIPT}">', f"<script>{script}")
-        text = base64.b64encode(page.encode()).decode("ascii")  # no srcdoc: its links lead into the notebook's own page
+        # no srcdoc: its links lead into the notebook's own page
+        text = base64.b64encode(page.encode()).decode("ascii")
         return (
             f'<iframe src="data:text/html;charset=utf-8;base64,{text}" title="live page" '
             'style="width:100%;height:780px;border:0"></iframe>'

@@ -60,11 +60,18 @@ def _bode_picture(each: PageCase) -> Picture:
     """Bode plot of the continuous-time and the sampled loop function; of the first alone where the other has none."""
     curve = each.loop_function
     rows = (
-        (own.period or 0.0, *row) for own in curve.sides for row in zip(own.omega, own.L.real, own.L.imag, strict=True)
+        (own.period or 0.0, *row)
+        for own in curve.sides
+        for row in zip(own.omega, own.L.real, own.L.imag, strict=True)
     )
     data = columns_of(("period_s", "omega_rad_s", "re_L", "im_L"), rows)
     return picture(
-        "loop_function", loop_function.loop.figure(curve), stem=each.stem("bode"), data=data, each=each, curve=curve
+        "loop_function",
+        loop_function.loop.figure(curve),
+        stem=each.stem("bode"),
+        data=data,
+        each=each,
+        curve=curve,
     )
 
 
@@ -86,7 +93,9 @@ def nyquist_section(report: ArmReport) -> PageSection:
         ]
     own = any(found.unstable_open for found in counts.values())
     blocks.append(sheet("nyquist_count", across(counts), own=own))
-    return PageSection(title="Nyquist plot: encirclements of −1", words=[prose("nyquist", own=own)], blocks=blocks)
+    return PageSection(
+        title="Nyquist plot: encirclements of −1", words=[prose("nyquist", own=own)], blocks=blocks
+    )
 
 
 # ------------------------------------------------------------ laws
@@ -110,7 +119,10 @@ def law_section(report: ArmReport) -> PageSection:
     words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete]))
     blocks = [sheet("law_entries", table([entry for each in named for entry in signal_entries(each)]))]
     return PageSection(
-        title="The controller" + "s" * (len(named) > 1), answer=prose("laws", each=named), words=words, blocks=blocks
+        title="The controller" + "s" * (len(named) > 1),
+        answer=prose("laws", each=named),
+        words=words,
+        blocks=blocks,
     )
 
 
@@ -122,7 +134,9 @@ class LawEntry(NamedTuple):
     unit: Annotated[str, Quantity("unit", help="unit of the signal")]
     enters: Annotated[str, Quantity("enters", help="whether the reference is subtracted from the signal")]
     numerator: Annotated[list[float] | str, Quantity("numerator", help="coefficients in descending powers")]
-    denominator: Annotated[list[float] | str, Quantity("denominator", help="coefficients in descending powers")]
+    denominator: Annotated[
+        list[float] | str, Quantity("denominator", help="coefficients in descending powers")
+    ]
 
 
 def signal_entries(each: PageCase) -> Iterator[LawEntry]:
@@ -164,7 +178,9 @@ def map_section(report: ArmReport) -> PageSection:
         unit=f"{plain(report.rate_unit, 4)} {unit_of(RATE_GAIN, arm)}",
         deepest=DEEPEST_MOMENT_GAIN * arm.input_per_torque,
     )
-    return PageSection(title="Stability region of both gains", facts=continuous_interval_facts(report), blocks=(drawn,))
+    return PageSection(
+        title="Stability region of both gains", facts=continuous_interval_facts(report), blocks=(drawn,)
+    )
 
 
 def continuous_interval_facts(report: ArmReport) -> list[Fact]:
@@ -237,7 +253,9 @@ def locus_data(data: Loci) -> Sequence[Column]:
     return [
         Column(data.name, of=data.exact.gain),
         *(
-            Column(f"{which}_{n}_{part}", of=["" if math.isnan(value) else value for value in values.tolist()])
+            Column(
+                f"{which}_{n}_{part}", of=["" if math.isnan(value) else value for value in values.tolist()]
+            )
             for which, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches))
             for n, row in enumerate(held_branches(branches))
             for part, values in (("re", row.real), ("im", row.imag))

@@ -15,9 +15,10 @@ from tfarm.report.blocks import PICTURES, PageSection, SavedBlock, keep, prose
 from tfarm.report.page import ArmReport
 from tfarm.schema import table, text, to_dict
 
-DIGITS = 4
-SHORT = {"gain_margin_db": "GM", "phase_margin_deg": "PM", "delay_margin_ms": "DM", "peak_sensitivity": "Ms"}  # a line
-SHOWN = (  # sections of the first page in their order: anchor, name of a picture, which of several; of modes a table
+# a line
+SHORT = {"gain_margin_db": "GM", "phase_margin_deg": "PM", "delay_margin_ms": "DM", "peak_sensitivity": "Ms"}
+# sections of the first page in their order: anchor, name of a picture, which of several; of modes a table
+SHOWN = (
     ("margins-map", "map", 0),
     ("margins", ".+-bode", 0),
     ("sampled", "sampled-(slew|measured)", 0),
@@ -83,7 +84,12 @@ def results(found: ResultCard, controller: str) -> list[dict[str, Any]]:
 
 def in_words(value: Any) -> Any:
     """A value of JSON as a page shows it."""
-    return {key: in_words(each) for key, each in value.items()} if isinstance(value, dict) else text(value, DIGITS)
+    digits = 4
+    return (
+        {key: in_words(each) for key, each in value.items()}
+        if isinstance(value, dict)
+        else text(value, digits)
+    )
 
 
 def blocks(sections: Mapping[str, PageSection]) -> Iterator[tuple[PageSection, SavedBlock | None]]:

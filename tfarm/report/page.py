@@ -69,7 +69,8 @@ from tfarm.studies.candidates import (
 )
 from tfarm.synthesis.design import Design, design
 
-FILM_FRAMES = 80  # at most: a second of computing
+# at most: a second of computing
+FILM_FRAMES = 80
 
 
 # ------------------------------------------------------------ a controller
@@ -116,7 +117,9 @@ class PageCase(OfCase):
     def gains(self) -> str:
         """Its gains with their values, or the signals that it reads."""
         law = self.law
-        return f"order {law.order}, of {', '.join(law.signals)}" if self.case.gains is None else gains_words(law)
+        return (
+            f"order {law.order}, of {', '.join(law.signals)}" if self.case.gains is None else gains_words(law)
+        )
 
     @property
     def title(self) -> str:
@@ -433,7 +436,8 @@ def best(arm: Arm, chain: Chain) -> Design | None:
         found = design(arm, modes=DESIGNED_MODES, chain=chain) if has_loop(arm) else None
     except ConvergenceError:
         return None
-    return None if found is None or found.at_limit else found  # where the hub does not move there is no law to draw
+    # where the hub does not move there is no law to draw
+    return None if found is None or found.at_limit else found
 
 
 def sign_words(arm: Arm) -> str:

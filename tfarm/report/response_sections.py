@@ -28,7 +28,6 @@ from tfarm.spectrum.listing import SHAPE_DIGITS, beyond_the_box
 
 # as `tfarm modes` lists them; shapes in three rows of two
 TABLED_MODES = 10
-DRAWN_MODES = 6
 THEORIES: tuple[Theory, ...] = ("timoshenko", "shear", "rayleigh", "euler-bernoulli")
 
 
@@ -101,7 +100,8 @@ def file_parameters(arm: Arm, table: Mapping[str, Any], under: str = "") -> Iter
             yield from file_parameters(
                 arm, {str(number): each for number, each in enumerate(value, 1)}, f"{under}{key}."
             )
-        elif key not in ("name", "assumptions"):  # which are in other places of the page
+        elif key not in ("name", "assumptions"):
+            # which are in other places of the page
             of = file_key(f"{under}{key}", arm)
             yield FileParameter(of.label, value, unit(of.unit), f"{under}{key}")
 
@@ -143,7 +143,12 @@ def derived_table(arm: Arm) -> Table:
             ("slenderness", "L/√(I/A)", link.slenderness, ""),
         )
     ] + [
-        Derived("rotor inertia at the hub", "N² J_m", arm.motor is not None and arm.motor.reflected_inertia, "kg m²"),
+        Derived(
+            "rotor inertia at the hub",
+            "N² J_m",
+            arm.motor is not None and arm.motor.reflected_inertia,
+            "kg m²",
+        ),
         Derived(
             "root moment per torque at rest",
             "−(J − I_h)/J" * arm.is_uniform,
@@ -157,7 +162,10 @@ def derived_table(arm: Arm) -> Table:
             unit_of(MOMENT_GAIN, arm),
         ),
         Derived(
-            f"losses at the hub, in {RATE_GAIN}", "", arm.rate_loss != 0.0 and arm.rate_loss, unit_of(RATE_GAIN, arm)
+            f"losses at the hub, in {RATE_GAIN}",
+            "",
+            arm.rate_loss != 0.0 and arm.rate_loss,
+            unit_of(RATE_GAIN, arm),
         ),
     ]
     return sheet("derived", table([row for row in rows if row.value is not False]), arm=arm)
@@ -168,6 +176,7 @@ def derived_table(arm: Arm) -> Table:
 
 def modes_section(report: ArmReport) -> PageSection:
     """Everything about free vibration: at C = 0, and the eigenvalues at the arm's own C."""
+    drawn_modes = 6
     arm = report.arm
     words = [prose("complete_modes")]
     blocks: list[Picture | Table] = [modal_table(report)]
@@ -179,8 +188,8 @@ def modes_section(report: ArmReport) -> PageSection:
             blocks += damped_tables(report)
         except (ConvergenceError, CertificationError) as error:
             words.append(prose("no_damped_table", why=error))
-    drawn = report.modes(DRAWN_MODES)
-    shapes = motion.scaled(drawn, DRAWN_MODES)
+    drawn = report.modes(drawn_modes)
+    shapes = motion.scaled(drawn, drawn_modes)
     columns = (
         Column("x_m", of=np.linspace(0.0, arm.length, motion.SHAPE_POINTS)),
         *(Column(f"mode_{number}", of=np.round(w, SHAPE_DIGITS - 1) + 0.0) for number, w in shapes.items()),
@@ -206,7 +215,14 @@ def modal_table(report: ArmReport) -> Table:
         participation, moment = kept_digits((row.hub_participation, row.modal_moment + 0.0), SHAPE_DIGITS)
         nodes = np.round(row.nodes, decimals).tolist()
         rows.append(replace(row, hub_participation=participation, modal_moment=moment, nodes=nodes))
-    names = ("index", "natural_frequency", "natural_frequency_hz", "hub_participation", "modal_moment", "nodes")
+    names = (
+        "index",
+        "natural_frequency",
+        "natural_frequency_hz",
+        "hub_participation",
+        "modal_moment",
+        "nodes",
+    )
     columns = table(rows, names).columns
     proof = how_proven(report, columns[1].cells, columns[2].cells)
     return sheet("modal_table", columns, arm=report.arm, proof=proof)
@@ -277,7 +293,13 @@ def theories(found: Mapping[Theory, Modes]) -> Table:
     columns = (
         Column("mode", "mode", of=range(1, TABLED_MODES + 1)),
         *(
-            Column(f"{theory.replace('-', '_')}_rad_s", theory.title(), "rad/s", of=each, digits=column_format(8, 7))
+            Column(
+                f"{theory.replace('-', '_')}_rad_s",
+                theory.title(),
+                "rad/s",
+                of=each,
+                digits=column_format(8, 7),
+            )
             for theory, each in omega.items()
         ),
         *(
@@ -298,10 +320,12 @@ def sensitivity_table(modes: Modes) -> Table:
     """Per cent of frequency per per cent of each parameter: a row a parameter, a column a mode."""
     flexible = modes.index > 0
     rows = {
-        name.replace("youngs", "Young's").replace("_", " "): np.round(values[flexible], SHAPE_DIGITS - 1) + 0.0
+        name.replace("youngs", "Young's").replace("_", " "): np.round(values[flexible], SHAPE_DIGITS - 1)
+        + 0.0
         for name, values in modes.sensitivity.items()
     }
-    shown = {name: values for name, values in rows.items() if abs(values).max() > 5e-7}  # which do not read as zero
+    # which do not read as zero
+    shown = {name: values for name, values in rows.items() if abs(values).max() > 5e-7}
     by_mode = zip(modes.index[flexible], np.array(list(shown.values())).T, strict=True)
     columns = (
         Column("parameter", "parameter", of=list(shown)),
@@ -318,7 +342,10 @@ def sensitivity_table(modes: Modes) -> Table:
         ),
     )
     return sheet(
-        "sensitivities", columns, is_rig=not modes.arm.is_uniform, dropped=[name for name in rows if name not in shown]
+        "sensitivities",
+        columns,
+        is_rig=not modes.arm.is_uniform,
+        dropped=[name for name in rows if name not in shown],
     )
 
 
@@ -412,10 +439,16 @@ def measured_section(report: ArmReport) -> PageSection:
     for number, found in enumerate(report.overlays, start=1):
         label = f"-{number}" if len(report.measured) > 1 else ""
         name = found.measured.label
-        words.append(prose("measured_response", name=name, found=found, peaks=found.unmatched / (2 * math.pi)))
+        words.append(
+            prose("measured_response", name=name, found=found, peaks=found.unmatched / (2 * math.pi))
+        )
         blocks += [
             picture(
-                "measured", frequency.measured.figure(found), stem=f"measured{label}", data=found.csv_table, name=name
+                "measured",
+                frequency.measured.figure(found),
+                stem=f"measured{label}",
+                data=found.csv_table,
+                name=name,
             ),
             sheet("measured_modes", table(found.modes), stem=f"measured-modes{label}"),
             sheet("measured_required", table(found.required_changes), stem=f"measured-required{label}"),

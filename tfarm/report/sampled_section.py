@@ -41,7 +41,15 @@ def sampled_section(report: ArmReport) -> PageSection:
         (_, own), *_ = found
         blocks = [overlay_picture(report, own), *blocks, loci_picture(report, own)]
         facts = [*sampled_interval_facts(own), *facts]
-    of_whole_law = ("index", "natural_frequency", "band", "aliased", "first_order", "by_damping", "log_radius")
+    of_whole_law = (
+        "index",
+        "natural_frequency",
+        "band",
+        "aliased",
+        "first_order",
+        "by_damping",
+        "log_radius",
+    )
     for each, it in found:
         modes = table(it.modes, () if it.loop.is_of_gains else of_whole_law)
         blocks.append(sheet("sampled_modes", modes, stem=_stem("modes", each), each=each, found=it))
@@ -75,7 +83,11 @@ def chain_words(arm: Arm, chain: Chain) -> str:
 
 def _stem(name: str, each: PageCase) -> str:
     """The name of a controller's table; the first has no more than the name."""
-    return f"sampled-{name}" if each.key in ("default", "law") else f"sampled-{name}-{each.key.replace('_', '-')}"
+    return (
+        f"sampled-{name}"
+        if each.key in ("default", "law")
+        else f"sampled-{name}-{each.key.replace('_', '-')}"
+    )
 
 
 def delays_table(report: ArmReport) -> Table:
@@ -152,7 +164,11 @@ def slews(report: ArmReport) -> tuple[list[Picture | Table], list[str], list[Fac
         except ParameterError as error:
             words.append(f"No slew of {each.name} is simulated: {error}.")
     if len({each.arm.input_unit for each in simulated}) > 1:
-        return [], [*words, "The controllers drive inputs of different units: their slews are not drawn together."], []
+        return (
+            [],
+            [*words, "The controllers drive inputs of different units: their slews are not drawn together."],
+            [],
+        )
     if not runs:
         return [], words, []
     arm = simulated[0].arm
@@ -222,7 +238,10 @@ def response_columns(arm: Arm, each: Mapping[str, Simulation]) -> Sequence[Colum
     t = min((moment.t for moment in moments.values()), key=len)
     first = next(iter(each.values()))
     rigid = np.r_[first.scenario.rigid_moment[1:], first.scenario.rigid_moment[-1:]]
-    columns: list[Column] = [Column("t_s", of=t), Column("rigid_moment_N_m", of=traces.held_at(first, rigid, t))]
+    columns: list[Column] = [
+        Column("t_s", of=t),
+        Column("rigid_moment_N_m", of=traces.held_at(first, rigid, t)),
+    ]
     driven = "torque" if arm.input_unit == "N m" else "input"
     unit = arm.input_unit
     for key, run in each.items():
@@ -251,7 +270,9 @@ class StepRow(NamedTuple):
             "overshoot_percent",
         ),
     ]
-    end: Annotated[float, Quantity("error at the end", "deg", 3, "hub angle less reference at the last sample")]
+    end: Annotated[
+        float, Quantity("error at the end", "deg", 3, "hub angle less reference at the last sample")
+    ]
 
 
 def step_rows(name: str, found: RunComparison) -> Iterator[StepRow]:
@@ -307,7 +328,8 @@ def compared_data(found: Mapping[str, RunComparison]) -> Iterator[Column]:
 # ------------------------------------------------------------ the gain tuner
 
 
-SAME_COST = 1e-4  # relative difference of two costs below which they are called the same
+# relative difference of two costs below which they are called the same
+SAME_COST = 1e-4
 
 
 def tuner_section(report: ArmReport) -> PageSection:
@@ -370,7 +392,11 @@ def tuner_facts(data: TunerNumbers) -> tuple[Fact, ...]:
     return (
         Fact("tuner against the best constant gain", less, note=f"median of {data.curves.seeds} seeds"),
         Fact("cost without moment feedback", significant(tuning.without.cost, 4)),
-        Fact("best constant gain", significant(best.cost, 4), note=f"{MOMENT_GAIN} = {significant(best.gain, 3)}"),
+        Fact(
+            "best constant gain",
+            significant(best.cost, 4),
+            note=f"{MOMENT_GAIN} = {significant(best.gain, 3)}",
+        ),
         Fact("tuner", median, note=f"half between {low} and {high}"),
         Fact("bound", significant(tuning.bound.cost, 4), note="linear-quadratic optimum"),
         Fact("tip error at the end", significant(1e3 * abs(left), 2), "mm"),

@@ -65,12 +65,20 @@ def proof_tables(proofs: Sequence[ArmProof]) -> list[Table]:
     columns = (
         Column("mode", "mode", of=range(1, PROVEN_MODES + 1)),
         *(
-            Column(f"{name}_rad_s", name, "rad/s", of=own, shown=[f"{text}…" if text else UNPROVEN for text in own])
+            Column(
+                f"{name}_rad_s",
+                name,
+                "rad/s",
+                of=own,
+                shown=[f"{text}…" if text else UNPROVEN for text in own],
+            )
             for name, own in digits.items()
         ),
     )
     return [
-        sheet("counts", table(proofs, ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict"))),
+        sheet(
+            "counts", table(proofs, ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict"))
+        ),
         sheet("digits", columns, modes=PROVEN_MODES, digits=BRACKET_DIGITS),
         sheet("boxes", table([each for proof in proofs for each in proof.boxes]), digits=PROVEN_DIGITS),
     ]
@@ -87,41 +95,26 @@ def published_tables(found: published.Validation) -> list[Table]:
     ]
 
 
-AUDIT_COLUMNS = (
-    "equation",
-    "verdict",
-    "printed",
-    "corrected",
-    "residual_printed",
-    "residual_corrected",
-    "evidence",
-)
 TRUST_FOLDER = "trust"
-PACKAGES = (
-    "numpy",
-    "scipy",
-    "numba",
-    "mpmath",
-    "python-flint",
-    "sympy",
-    "control",
-    "matplotlib",
-    "latex2mathml",
-)
 
 
 def in_letters(text: str) -> Markup:
     """The audit's plain text with Greek letters, subscripts and exponents: theta_t^2 becomes θ<sub>t</sub>²."""
     greek = LETTER.sub(lambda name: GREEK[name[1]], powers(unit(str(escape(text)))))
     return Markup(
-        re.sub(r"(?<![^\W\d_])([A-Za-zΑ-Ωα-ω])_([a-z]{1,2}|\d{1,2})(?![A-Za-z0-9])", r"\1<sub>\2</sub>", greek)
+        re.sub(
+            r"(?<![^\W\d_])([A-Za-zΑ-Ωα-ω])_([a-z]{1,2}|\d{1,2})(?![A-Za-z0-9])", r"\1<sub>\2</sub>", greek
+        )
     )
 
 
 def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[Markup]]:
     """Both as MathML, a line each, the symbols in which they differ of the class "changed"."""
     both = [*_set(printed)], [*_set(corrected)]
-    a, b = ([leaf for line in each for leaf in line.iter() if leaf.tag in ("mi", "mo", "mn", "mtext")] for each in both)
+    a, b = (
+        [leaf for line in each for leaf in line.iter() if leaf.tag in ("mi", "mo", "mn", "mtext")]
+        for each in both
+    )
     matcher = SequenceMatcher(a=[leaf.text for leaf in a], b=[leaf.text for leaf in b], autojunk=False)
     for what, i, j, k, m in matcher.get_opcodes():
         for leaf in (*a[i:j], *b[k:m]) if what != "equal" else ():
@@ -133,9 +126,13 @@ def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[
 def _set(tex: str) -> Iterator[ElementTree.Element]:
     """A formula a line, without the name space that a file of XML would need and a page of HTML does not."""
     for line in re.split(r"(?<=[,;])\\quad\s*", tex):
-        upright = re.sub(r"\\mathrm\{(\w)\}", r"\\text{\1}", line.strip())  # a single letter would be slanted
-        root = ElementTree.fromstring(re.sub(r' xmlns="[^"]*"', "", convert(upright, display="block"), count=1))
-        root.attrib |= {"class": "long"} if len(line) > 300 else {}  # which is set smaller
+        # a single letter would be slanted
+        upright = re.sub(r"\\mathrm\{(\w)\}", r"\\text{\1}", line.strip())
+        root = ElementTree.fromstring(
+            re.sub(r' xmlns="[^"]*"', "", convert(upright, display="block"), count=1)
+        )
+        # which is set smaller
+        root.attrib |= {"class": "long"} if len(line) > 300 else {}
         for row in root.iter("mrow"):
             for before, leaf in pairwise([ElementTree.Element("mo"), *row]):
                 _correct(leaf, before)
@@ -155,16 +152,47 @@ def _correct(leaf: ElementTree.Element, before: ElementTree.Element) -> None:
 
 
 def write_trust(
-    audited: Sequence[AuditRow], printed: Sequence[published.PublishedRow], proofs: Sequence[ArmProof], folder: Path
+    audited: Sequence[AuditRow],
+    printed: Sequence[published.PublishedRow],
+    proofs: Sequence[ArmProof],
+    folder: Path,
 ) -> None:
     """index.html and its tables, into a folder of their own."""
+    audit_columns = (
+        "equation",
+        "verdict",
+        "printed",
+        "corrected",
+        "residual_printed",
+        "residual_corrected",
+        "evidence",
+    )
+    packages = (
+        "numpy",
+        "scipy",
+        "numba",
+        "mpmath",
+        "python-flint",
+        "sympy",
+        "control",
+        "matplotlib",
+        "latex2mathml",
+    )
     folder.mkdir()
     found = published.Validation(tuple(printed))
-    versions = {"tfarm": tfarm.__version__, "python": platform.python_version(), **{p: version(p) for p in PACKAGES}}
+    versions = {
+        "tfarm": tfarm.__version__,
+        "python": platform.python_version(),
+        **{p: version(p) for p in packages},
+    }
     worst = {output: [dict(proof.errors).get(output) for proof in proofs] for output in PROVEN_OUTPUTS}
     accuracy = (
         Column("arm", "arm", of=[proof.name for proof in proofs]),
-        Column("band_rad_s", "from … to, rad/s", of=[" … ".join(significant(x, 4) for x in p.band) for p in proofs]),
+        Column(
+            "band_rad_s",
+            "from … to, rad/s",
+            of=[" … ".join(significant(x, 4) for x in p.band) for p in proofs],
+        ),
         *(
             Column(
                 output,
@@ -175,7 +203,10 @@ def write_trust(
             for output, own in worst.items()
         ),
     )
-    columns = Column("package", "package", of=list(versions)), Column("version", "version", of=versions.values())
+    columns = (
+        Column("package", "package", of=list(versions)),
+        Column("version", "version", of=versions.values()),
+    )
     again = [sheet("inputs", table(proofs, ("name", "source", "sha256"))), sheet("versions", columns)]
     blocks = {
         "proofs": proof_tables(proofs),
@@ -184,7 +215,9 @@ def write_trust(
         "again": again,
     }
     sections = {name: save_section(PageSection(blocks=own), folder) for name, own in blocks.items()}
-    save_table(table(audited, AUDIT_COLUMNS, stem="audit", title="The paper, equation by equation"), folder / DATA)
+    save_table(
+        table(audited, audit_columns, stem="audit", title="The paper, equation by equation"), folder / DATA
+    )
     errors = [error for proof in proofs for _, error in proof.errors]
     names = " ".join(argument(proof.name, proof.source == "preset") for proof in proofs)
     write_text(

@@ -56,12 +56,18 @@ from tfarm.schema import Table, quantities, table
 from tfarm.stopping import Progress
 from tfarm.studies.study import Study
 
-Calls = Mapping[str, Sequence[Callable[[], Any]]]  # by task: what one process does in turn
-MOST_WORKERS = 2  # processes that share the pieces of a report: as many cores as a small machine has
-EVIDENCE = "method and proofs"  # a task of no arm
-MAP = "margins-map"  # anchor of the section that the overview begins with
-LOOP_TASK = "continuous loop"  # of sections that share a design
-SAMPLED_TASK = "sampled loop"  # of sections that share damped modes
+# by task: what one process does in turn
+Calls = Mapping[str, Sequence[Callable[[], Any]]]
+# processes that share the pieces of a report: as many cores as a small machine has
+MOST_WORKERS = 2
+# a task of no arm
+EVIDENCE = "method and proofs"
+# anchor of the section that the overview begins with
+MAP = "margins-map"
+# of sections that share a design
+LOOP_TASK = "continuous loop"
+# of sections that share damped modes
+SAMPLED_TASK = "sampled loop"
 TRUST_PAGE = f"{TRUST_FOLDER}/index.html"
 COMPARISON_PAGE = "compare.html"
 # names of folders that no arm may have
@@ -122,10 +128,19 @@ def _of_gains(report: ArmReport) -> bool:
 PIECES = (
     SectionSpec("stability region of both gains", MAP, loop_section.map_section, _of_gains, task=LOOP_TASK),
     SectionSpec(
-        "recommended gains", "margins-recommended", loop_section.recommended_section, _of_gains, task=LOOP_TASK
+        "recommended gains",
+        "margins-recommended",
+        loop_section.recommended_section,
+        _of_gains,
+        task=LOOP_TASK,
     ),
     SectionSpec(
-        "stability margins", "margins", loop_section.margins_section, _in_s, "Gains and margins", task=LOOP_TASK
+        "stability margins",
+        "margins",
+        loop_section.margins_section,
+        _in_s,
+        "Gains and margins",
+        task=LOOP_TASK,
     ),
     SectionSpec("Nyquist plot", "margins-nyquist", loop_section.nyquist_section, _in_s, task=LOOP_TASK),
     SectionSpec(
@@ -134,20 +149,32 @@ PIECES = (
         partial(bode_section, output="root_moment"),
         title="Bode plots",
     ),
-    SectionSpec("response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")),
-    SectionSpec("measured responses", "bode-measured", response_sections.measured_section, attrgetter("measured")),
+    SectionSpec(
+        "response of the tip", "bode-tip-displacement", partial(bode_section, output="tip_displacement")
+    ),
+    SectionSpec(
+        "measured responses", "bode-measured", response_sections.measured_section, attrgetter("measured")
+    ),
     SectionSpec("the arm", "arm", response_sections.arm_section, on="modes"),
     SectionSpec("modes", "modes", response_sections.modes_section, title="Arm and modes"),
     SectionSpec("root loci", "locus", loop_section.locus_section, _in_s, "Root loci", task=LOOP_TASK),
     SectionSpec(
-        "sampled loop", "sampled", sampled_section, attrgetter("has_loop"), "The sampled loop", task=SAMPLED_TASK
+        "sampled loop",
+        "sampled",
+        sampled_section,
+        attrgetter("has_loop"),
+        "The sampled loop",
+        task=SAMPLED_TASK,
     ),
     SectionSpec("controllers", "law", loop_section.law_section, _of_laws, "The controller"),
     SectionSpec("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner", task=SAMPLED_TASK),
-    SectionSpec("fit to measurements", "fit", response_sections.fit_section, attrgetter("fit"), "Fitted numbers"),
+    SectionSpec(
+        "fit to measurements", "fit", response_sections.fit_section, attrgetter("fit"), "Fitted numbers"
+    ),
     SectionSpec("assumptions", "assumptions", response_sections.assumptions_section, title="Assumptions"),
 )
-QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}  # pages that may be asked for alone
+# pages that may be asked for alone
+QUESTIONS = {piece.page: piece.title for piece in PIECES if piece.title}
 PAGES = {"index": "Overview", "live": "Live loop", **QUESTIONS}
 
 
@@ -229,7 +256,9 @@ def _check(names: Sequence[str], only: tuple[str, ...]) -> None:
     require(bool(names), "arms", (), "name at least one arm to report on")
     for question in only:
         must_be_known("only", question, QUESTIONS)
-    taken = dict.fromkeys(RESERVED_NAMES, "the folder of reports has a file of this name; give the arm another name")
+    taken = dict.fromkeys(
+        RESERVED_NAMES, "the folder of reports has a file of this name; give the arm another name"
+    )
     for name in names:
         require(name.casefold() not in taken, "name", name, taken.get(name.casefold(), ""))
         taken[name.casefold()] = "two arms of this name would share one folder; give one of them another name"
@@ -265,7 +294,11 @@ def _written(
 
 
 def tasks_of(
-    report: ArmReport, folder: Path, only: tuple[str, ...], out: Path, announce: Callable[[str], object] | None
+    report: ArmReport,
+    folder: Path,
+    only: tuple[str, ...],
+    out: Path,
+    announce: Callable[[str], object] | None,
 ) -> Calls:
     """What is to be made of one arm: its sections, its card and proof, and of a full report its first pages.
 
@@ -336,7 +369,12 @@ def make_all(tasks: Calls, progress: Progress | None) -> dict[str, Sequence[Any]
 
 
 def _write_pages(
-    report: ArmReport, folder: Path, made: Sequence[PageSection], only: Sequence[str], trust: str, earlier: Path
+    report: ArmReport,
+    folder: Path,
+    made: Sequence[PageSection],
+    only: Sequence[str],
+    trust: str,
+    earlier: Path,
 ) -> None:
     """The arm's file with its chain, its first page and those of its sections, or `only` some.
 
@@ -368,7 +406,9 @@ def _write_pages(
     for name in written:
         title = f"{report.arm.name}: {QUESTIONS[name]}" if name in QUESTIONS else report.arm.name
         command = command_of(report, name if name in QUESTIONS else "")
-        page = render("arm.html", title=title, sections=own[name], here=f"{name}.html", command=command, **shared)
+        page = render(
+            "arm.html", title=title, sections=own[name], here=f"{name}.html", command=command, **shared
+        )
         write_text(folder / f"{name}.html", page)
 
 
@@ -381,7 +421,12 @@ def navigation(arm: Arm, own: Sequence[tuple[str, str]], trust: str, folder: Pat
     exported = product(("controller", "tuner", "plant", "loop"), (".h", ".fmu", ".mat", ".py"))
     files = [f"{place}/{of}{end}" for of, end in exported if (folder / place / f"{of}{end}").is_file()]
     more += [(file, f"Exported: {Path(file).name}") for file in files]
-    return [("../index.html", "All arms"), *own, *more, *([(f"../{trust}", "Method and proofs")] if trust else [])]
+    return [
+        ("../index.html", "All arms"),
+        *own,
+        *more,
+        *([(f"../{trust}", "Method and proofs")] if trust else []),
+    ]
 
 
 def pages_in(*folders: Path, written: Sequence[str] = ()) -> list[tuple[str, str]]:
@@ -400,9 +445,15 @@ def trust_in(out: Path) -> str:
 
 def write_index(out: Path, stage: Path) -> None:
     """Write the page that leads to all others in a folder of reports, through a folder next to it."""
-    cards = [(card, pages) for folder, card in read_records(out, "card", Card).items() if (pages := pages_in(folder))]
+    cards = [
+        (card, pages)
+        for folder, card in read_records(out, "card", Card).items()
+        if (pages := pages_in(folder))
+    ]
     compared = kept_comparison(out)["title"]
-    page = render("index.html", title="tfarm reports", cards=cards, trust=trust_in(out), compared=compared, short=SHORT)
+    page = render(
+        "index.html", title="tfarm reports", cards=cards, trust=trust_in(out), compared=compared, short=SHORT
+    )
     write_text(stage / "index.html", page)
     move_into(stage, out)
 
@@ -426,7 +477,9 @@ def write_comparison(found: Comparison, out: Path) -> Path:
     arms = list(dict.fromkeys(side.arm.name for side in found.sides))
     drawn = picture("comparison_picture", comparison.figure(found), stem="comparison", found=found)
     rows = (
-        (of, getattr(found, name)) for name, of in quantities(Comparison).items() if of.label and name != "is_sampled"
+        (of, getattr(found, name))
+        for name, of in quantities(Comparison).items()
+        if of.label and name != "is_sampled"
     )
     first, *tables = (sheet("compared", table(each), stem=f"compare-{of.key}", of=of) for of, each in rows)
     with place_in(out, "--out") as made:
@@ -465,7 +518,10 @@ def write_study(found: Study) -> Path:
 def study_sections(found: Study) -> list[PageSection]:
     """Return findings, distributions, drivers, responses, worst arm and failures of a study, as far as it has them."""
     facts = [
-        *(Fact(each.loop, f"{each.stable:,}", f"of {found.done:,} arms stable", each.finding) for each in found.shares),
+        *(
+            Fact(each.loop, f"{each.stable:,}", f"of {found.done:,} arms stable", each.finding)
+            for each in found.shares
+        ),
         Fact("arms computed", f"{found.done:,}", note=f"of {found.rows:,}"),
     ]
     distributions: list[Picture | Table] = []
@@ -479,10 +535,15 @@ def study_sections(found: Study) -> list[PageSection]:
         try:
             figure = studies.study_band.figure(found, output)
             name = signal_words(output)[0]
-            responses.append(picture("study_band", figure, stem=f"study-{output.replace('_', '-')}", name=name))
+            responses.append(
+                picture("study_band", figure, stem=f"study-{output.replace('_', '-')}", name=name)
+            )
         except TfarmError as error:
             missing.append(f"{output}: {error}.")
-    numbers = [sheet("study_ranges", table(found.spreads)), sheet("study_numbers", found.varied_numbers, found=found)]
+    numbers = [
+        sheet("study_ranges", table(found.spreads)),
+        sheet("study_numbers", found.varied_numbers, found=found),
+    ]
     worst = [] if found.worst is None else [prose("study_worst", worst=found.worst)]
     sections = (
         PageSection(title="Findings", facts=facts, words=[prose("study", found=found)], blocks=numbers),

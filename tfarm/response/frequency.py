@@ -30,12 +30,12 @@ from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.exact.outputs import Output, unit_over
 from tfarm.exact.rigid import rigid_response
 from tfarm.records import frozen
+from tfarm.response.transfer import TransferFunction, transfer
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
-from .transfer import TransferFunction, transfer
-
-BAND_POINTS = 100  # of the error, even in ln w
+# of the error, even in ln w
+BAND_POINTS = 100
 
 
 def worst_error(arm: Arm, output: str, band: tuple[float, float]) -> float | None:
@@ -59,8 +59,10 @@ def worst_error(arm: Arm, output: str, band: tuple[float, float]) -> float | Non
     return max(errors, default=None)
 
 
-HERTZ = 2 * math.pi  # rad/s
-NARROWEST = 4 * float(np.finfo(float).eps)  # relative width below which no interval is halved
+# rad/s
+HERTZ = 2 * math.pi
+# relative width below which no interval is halved
+NARROWEST = 4 * float(np.finfo(float).eps)
 
 ResponseFunction = Callable[[Complex], Any]
 
@@ -72,7 +74,9 @@ class Extremum(NamedTuple):
     """
 
     omega: Annotated[float, Quantity("angular frequency", "rad/s", 7, "frequency of the extremum")]
-    magnitude: Annotated[float, Quantity("magnitude", help="|G|; inf or 0 at a root on the axis", unit_of="gain_unit")]
+    magnitude: Annotated[
+        float, Quantity("magnitude", help="|G|; inf or 0 at a root on the axis", unit_of="gain_unit")
+    ]
 
     @property
     def frequency(self) -> Annotated[float, Quantity("frequency", "Hz", 7, "angular frequency over 2 pi")]:
@@ -87,7 +91,9 @@ class Root(NamedTuple):
     s: Annotated[complex, Quantity("s", "1/s", 10, "of two conjugates that with Im s > 0", key="s")]
     frequency: Annotated[float, Quantity("frequency", "Hz", 8, "Im s over 2 pi; 0 if real")]
     damping: Annotated[float | None, Quantity("damping ratio", help="-Re s/|s|", key="damping_ratio")]
-    magnitude: Annotated[float, Quantity("magnitude", help="|G| at i Im s, or i |s| if real", unit_of="gain_unit")]
+    magnitude: Annotated[
+        float, Quantity("magnitude", help="|G| at i Im s, or i |s| if real", unit_of="gain_unit")
+    ]
 
 
 def extrema(
@@ -98,10 +104,12 @@ def extrema(
     `value` is G on the grid, `roots` [1/s] are poles and zeros near it, `infinite` and `vanishing` [rad/s] the
     frequencies of those on the imaginary axis, which are not in the grid.
     """
-    from scipy.signal import find_peaks  # half a second to import
+    # half a second to import
+    from scipy.signal import find_peaks
 
     on_axis = np.sort(np.r_[infinite, vanishing])
-    between = (on_axis[:-1] + on_axis[1:]) / 2  # two roots may have no point of the grid between them
+    # two roots may have no point of the grid between them
+    between = (on_axis[:-1] + on_axis[1:]) / 2
     at = np.r_[omega, between, infinite, vanishing]
     with np.errstate(divide="ignore"):
         limits = np.repeat([np.inf, -np.inf], [infinite.size, vanishing.size])
@@ -132,7 +140,8 @@ def _halved(G: ResponseFunction, omega: Real, height: Real, roots: Complex) -> t
         with np.errstate(invalid="ignore"):
             slope = np.diff(height) / np.diff(omega)
             change = abs(np.diff(slope))
-        change[~np.isfinite(change)] = 0.0  # next to a root on the axis the slope is steep
+        # next to a root on the axis the slope is steep
+        change[~np.isfinite(change)] = 0.0
         near = np.maximum(np.r_[0.0, change], np.r_[change, 0.0])
         found = np.flatnonzero(abs(slope) <= near)
         left = omega[found]
@@ -155,14 +164,21 @@ def _refined(G: ResponseFunction, omega: Real, height: Real, places: Whole) -> t
         slope = np.diff(height) / np.diff(omega)
         vertex = middle[at - 1] + (middle[at] - middle[at - 1]) * slope[at - 1] / (slope[at - 1] - slope[at])
     vertex = np.where(np.isfinite(vertex), np.clip(vertex, omega[at - 1], omega[at + 1]), omega[at])
-    finite = dict(zip(at.tolist(), zip(vertex.tolist(), abs(G(1j * vertex)).tolist(), strict=True), strict=True))
+    finite = dict(
+        zip(at.tolist(), zip(vertex.tolist(), abs(G(1j * vertex)).tolist(), strict=True), strict=True)
+    )
     limit = {np.inf: np.inf, -np.inf: 0.0}
-    return tuple(Extremum(*finite.get(i) or (float(omega[i]), limit[float(height[i])])) for i in places.tolist())
+    return tuple(
+        Extremum(*finite.get(i) or (float(omega[i]), limit[float(height[i])])) for i in places.tolist()
+    )
 
 
-EVEN_PER_DECADE = 120  # points of the even grid
-NEAREST = 1e-6  # relative distance of the nearest point to a root on the axis
-AXIS_SHARE = 1e-12  # |Re s|/|s| below which a root is on the imaginary axis
+# points of the even grid
+EVEN_PER_DECADE = 120
+# relative distance of the nearest point to a root on the axis
+NEAREST = 1e-6
+# |Re s|/|s| below which a root is on the imaginary axis
+AXIS_SHARE = 1e-12
 
 
 @frozen(slots=True, kw_only=True)
@@ -178,26 +194,39 @@ class Bode:
     arm: Arm
     row: Output = field(repr=False)
     x: Annotated[float | None, Quantity(help="place of the output [m]")] = None
-    omega: Annotated[Real, Quantity("angular frequency", "rad/s", help="grid refined at poles and zeros", curve=True)]
+    omega: Annotated[
+        Real, Quantity("angular frequency", "rad/s", help="grid refined at poles and zeros", curve=True)
+    ]
     value: Annotated[Complex, Quantity("value", help="G(i omega), output over input", curve=True)]
-    phase: Annotated[Real, Quantity("phase", "deg", help="continuous; -180 deg at a pole on the axis", curve=True)]
+    phase: Annotated[
+        Real, Quantity("phase", "deg", help="continuous; -180 deg at a pole on the axis", curve=True)
+    ]
     poles: Complex
     zeros: Complex
     rigid: Complex
-    at_poles: Real  # |G| at the frequency of each pole; inf on the axis
-    at_zeros: Real  # and of each zero; 0 on the axis
-    peaks: Annotated[tuple[Extremum, ...], Quantity("peaks", help="local maxima of the magnitude")]  # ascending
+    # |G| at the frequency of each pole; inf on the axis
+    at_poles: Real
+    # and of each zero; 0 on the axis
+    at_zeros: Real
+    # ascending
+    peaks: Annotated[tuple[Extremum, ...], Quantity("peaks", help="local maxima of the magnitude")]
     dips: Annotated[tuple[Extremum, ...], Quantity("dips", help="local minima of the magnitude")]
     pole_width: Annotated[
         tuple[float, float],
         Quantity(
-            "poles complete in Re s", "1/s", help="all with Im s up to the last frequency", key="poles_between_re_1_s"
+            "poles complete in Re s",
+            "1/s",
+            help="all with Im s up to the last frequency",
+            key="poles_between_re_1_s",
         ),
     ]
     zero_width: Annotated[
         tuple[float, float],
         Quantity(
-            "zeros complete in Re s", "1/s", help="all with Im s up to the last frequency", key="zeros_between_re_1_s"
+            "zeros complete in Re s",
+            "1/s",
+            help="all with Im s up to the last frequency",
+            key="zeros_between_re_1_s",
         ),
     ]
 
@@ -222,12 +251,16 @@ class Bode:
         return np.abs(self.value)
 
     @property
-    def pole_list(self) -> Annotated[list[Root], Quantity("poles", help="not cancelled, without 0", key="poles")]:
+    def pole_list(
+        self,
+    ) -> Annotated[list[Root], Quantity("poles", help="not cancelled, without 0", key="poles")]:
         """The poles of the upper half-plane."""
         return list(map(self._root, itertools.repeat("pole"), self.poles.tolist(), self.at_poles.tolist()))
 
     @property
-    def zero_list(self) -> Annotated[list[Root], Quantity("zeros", help="not cancelled, without 0", key="zeros")]:
+    def zero_list(
+        self,
+    ) -> Annotated[list[Root], Quantity("zeros", help="not cancelled, without 0", key="zeros")]:
         """The zeros of the upper half-plane, without rounding of Re s on the axis."""
         zeros = self.zeros
         if self.arm.has_elastic_link:
@@ -239,7 +272,9 @@ class Bode:
         return Root(kind, s, s.imag / HERTZ, -s.real / abs(s) + 0.0 if s else None, size)
 
     @property
-    def finding(self) -> Annotated[str, Quantity("poles and zeros", help="with Im s >= 0, after cancellation")]:
+    def finding(
+        self,
+    ) -> Annotated[str, Quantity("poles and zeros", help="with Im s >= 0, after cancellation")]:
         """The numbers of poles and zeros in words."""
         return f"{self.poles.size} poles and {self.zeros.size} zeros up to {self.band[1]:.6g} rad/s"
 
@@ -279,7 +314,9 @@ class Bode:
         return self.row.label if self.x is None else self.row.label.replace("at x", f"at x = {self.x:g} m")
 
     @property
-    def gain_unit(self) -> Annotated[str, Quantity("unit", help="SI unit of G, output over input", key="unit")]:
+    def gain_unit(
+        self,
+    ) -> Annotated[str, Quantity("unit", help="SI unit of G, output over input", key="unit")]:
         """SI unit of the response, e.g. N m/(N m)."""
         return unit_over(self.row.unit, self.arm.input_unit)
 
@@ -319,11 +356,13 @@ def bode(
     G.must_be_of_the_hub("a Bode plot, with its zeros,")
     if not np.any(G(1j * np.geomspace(*band, 3))):
         return _no_motion(arm, row, G.x, band)
-    beyond = 1.3 * band[1]  # roots just above the range shape its edge
+    # roots just above the range shape its edge
+    beyond = 1.3 * band[1]
     all_poles = G.poles(up_to=beyond)
     all_zeros = G.zeros(up_to=beyond)
     poles, zeros = without_cancelled(_upper(all_poles.values), _upper(all_zeros.values))
-    if all_zeros.proof == "constant":  # by an end condition: it has no pole of the arm
+    # by an end condition: it has no pole of the arm
+    if all_zeros.proof == "constant":
         poles = poles[:0]
     omega = refined_grid(band, np.r_[poles, zeros])
     value = G(1j * omega)
@@ -331,7 +370,9 @@ def bode(
     inside_zeros = zeros[zeros.imag < band[1]]
     infinite, vanishing = map(_on_axis, (inside_poles, inside_zeros))
     roots = np.r_[poles, zeros]
-    peaks, dips = extrema(G, omega, value, roots, infinite[infinite > band[0]], vanishing[vanishing > band[0]])
+    peaks, dips = extrema(
+        G, omega, value, roots, infinite[infinite > band[0]], vanishing[vanishing > band[0]]
+    )
     return Bode(
         arm=arm,
         row=row,
@@ -409,7 +450,8 @@ def refined_grid(band: tuple[float, float], roots: Complex) -> Real:
     even = np.geomspace(low, high, 1 + math.ceil(EVEN_PER_DECADE * math.log10(high / low)))
     grid = np.unique(np.r_[even, *(_around(root) for root in roots if root.imag > 0)])
     on_axis = _on_axis(roots)
-    if on_axis.size:  # none so near to a root that the value is rounding
+    # none so near to a root that the value is rounding
+    if on_axis.size:
         gap = abs(grid[:, None] / on_axis - 1).min(axis=1)
         grid = grid[gap >= 0.5 * NEAREST]
     return grid[(grid >= low) & (grid <= high)]

@@ -63,7 +63,8 @@ class Signals:
         key = (s.shape, s.tobytes())
         kept = self._kept
         found = kept.pop(key, None) or read_only(self.parts(s))
-        kept[key] = found  # the last one is the latest
+        # the last one is the latest
+        kept[key] = found
         # 24: sets of points whose values are cached
         if len(kept) > 24:
             del kept[next(iter(kept))]
@@ -83,8 +84,10 @@ class Signals:
             rows = [n for n, place in enumerate(self.places) if place == share]
             free = free_outputs(k, [self.outputs[n] for n in rows], s.ravel(), share)
             first = first or LoopParts(free.drive, numerators, free.scale)
-            numerators[rows] = free.outputs * np.exp(free.scale - first.scale)  # each layout has its own scale
-        assert first is not None  # there is at least one signal
+            # each layout has its own scale
+            numerators[rows] = free.outputs * np.exp(free.scale - first.scale)
+        # there is at least one signal
+        assert first is not None
         return LoopParts(*(part.reshape(*part.shape[:-1], *s.shape) for part in first))
 
     def values(self, s: NDArray[Any]) -> Complex:
@@ -97,7 +100,8 @@ class Signals:
     def orders(self) -> tuple[int, ...]:
         """The order of each numerator's zero at s = 0; that of the drive is `system.at_rest`."""
         return tuple(
-            order_at_zero(self.system, wanted, share) for wanted, share in zip(self.outputs, self.places, strict=True)
+            order_at_zero(self.system, wanted, share)
+            for wanted, share in zip(self.outputs, self.places, strict=True)
         )
 
     @cached_property
@@ -129,10 +133,16 @@ class ControllerSignals:
     law: Annotated[str, Quantity("controller", help="its gains at the hub, or its name")]
     gains: Annotated[dict[str, float], Quantity(help="gain at the hub", flat=True)]
     gain_units: Annotated[dict[str, str], Quantity(help="SI unit of each gain")]
-    signals: Annotated[dict[str, str], Quantity("signals", help="outputs that are fed back, with their SI units")]
-    law_order: Annotated[int, Quantity("order of the controller", help="number of its states, without delays")]
+    signals: Annotated[
+        dict[str, str], Quantity("signals", help="outputs that are fed back, with their SI units")
+    ]
+    law_order: Annotated[
+        int, Quantity("order of the controller", help="number of its states, without delays")
+    ]
     delay: Annotated[float, Quantity(unit="s", help="delay of the controller")]
-    sign_convention: Annotated[str, Quantity("sign convention", help="control law from the signals to the input")]
+    sign_convention: Annotated[
+        str, Quantity("sign convention", help="control law from the signals to the input")
+    ]
     input: Annotated[str, Quantity("input", help="actuating signal")]
 
 
@@ -160,7 +170,9 @@ def sign_convention(law: Law, arm: Arm) -> str:
     sign = "-" if law.sign < 0 else "+"
     variable = "z" if law.is_discrete else "s"
     late = f", delay {law.delay:g} s" if law.delay else ""
-    return f"v = {sign}sum of C_i({variable}) y_i{late}; v is {input_words(arm)}, y = ({', '.join(law.signals)})"
+    return (
+        f"v = {sign}sum of C_i({variable}) y_i{late}; v is {input_words(arm)}, y = ({', '.join(law.signals)})"
+    )
 
 
 def sign_of(arm: Arm) -> str:
@@ -171,6 +183,5 @@ def sign_of(arm: Arm) -> str:
     if not arm.has_rigid_mode:
         return f"{words}; u is {input_words(arm)}"
     share = arm.gauged_inertia / arm.total_inertia
-    return (
-        f"{words}; u is {input_words(arm)}, and a static torque at the hub gives the moment {-share:.6g} times as much"
-    )
+    at_rest = f"a static torque at the hub gives the moment {-share:.6g} times as much"
+    return f"{words}; u is {input_words(arm)}, and {at_rest}"

@@ -95,7 +95,9 @@ def _on_axis(frequencies: NDArray[np.float64], at_zero: int, up_to: float) -> Ro
 
 def _near_poles(arm: Arm, up_to: float) -> Complex:
     """Return estimates of an arm's poles, and real starts."""
-    return np.r_[damped_starts(arm, flexible_frequencies(arm, 1.5 * up_to)), np.linspace(-up_to, -up_to / 50, 40)]
+    return np.r_[
+        damped_starts(arm, flexible_frequencies(arm, 1.5 * up_to)), np.linspace(-up_to, -up_to / 50, 40)
+    ]
 
 
 def _starts_by_sampling(size_at: Callable[[Complex], Real], up_to: float) -> Complex:
@@ -125,10 +127,13 @@ def _in_box(k: System, function: Function, at_zero: int, up_to: float, starts: C
     """Return the zeros of a function in a box of that height; the box grows where a zero lies on its edge."""
 
     def box_of(height: float) -> Box:
-        return Box(-min(TOWARD_SINGULAR / k.damping, height) if k.damping else -height, height, -height, height)
+        return Box(
+            -min(TOWARD_SINGULAR / k.damping, height) if k.damping else -height, height, -height, height
+        )
 
     found, box = complete_zeros(function, box_of, up_to, starts)
-    if k.is_undamped:  # zeros come in +- pairs too
+    # zeros come in +- pairs too
+    if k.is_undamped:
         found = np.where(abs(found.real) < REAL_SHARE * abs(found), 1j * found.imag, found)
     found = found[np.lexsort((-found.imag, found.real.round(9), abs(found.imag).round(9)))]
     return Roots(np.r_[np.zeros(at_zero, complex), found], (*box,), "winding number")
@@ -140,11 +145,17 @@ if TYPE_CHECKING:
 A_FREQUENCY = "a positive, finite frequency in rad/s"
 
 
-Wanted = str | Output | Sequence[str | Output]  # one output or several
+# one output or several
+Wanted = str | Output | Sequence[str | Output]
 
 
 def transfer(
-    arm: Arm, outputs: Wanted, *, x: float | None = None, method: Method = "closed-form", input: str | None = None
+    arm: Arm,
+    outputs: Wanted,
+    *,
+    x: float | None = None,
+    method: Method = "closed-form",
+    input: str | None = None,
 ) -> TransferFunction:
     """Return the exact transfer function from the arm's input to one output or several.
 
@@ -179,11 +190,14 @@ class TransferFunction:
         self.load = load_of(input, arm.length) if input is not None and is_load(input) else None
         self._input = input
         if input is not None and self.load is None:
-            arm = replace(arm, input=cast("Input", input))  # checked by the record
+            # checked by the record
+            arm = replace(arm, input=cast("Input", input))
         self.method = known_method(method)
         self.arm = arm
         self.is_single = isinstance(outputs, str | Output)
-        each = tuple(outputs) if isinstance(outputs, Iterable) and not isinstance(outputs, str) else (outputs,)
+        each = (
+            tuple(outputs) if isinstance(outputs, Iterable) and not isinstance(outputs, str) else (outputs,)
+        )
         require(each, "outputs", outputs, "name at least one output")
         self.rows: tuple[Output, ...] = tuple(map(output, each))
         self.system: System = system_of(arm)
@@ -268,7 +282,9 @@ class TransferFunction:
     def _values(self, s: Complex) -> Complex:
         if self.load is not None:
             balls = (
-                loaded_value(self.system, self.load, each, at, self.share) for each in self.rows for at in s.tolist()
+                loaded_value(self.system, self.load, each, at, self.share)
+                for each in self.rows
+                for at in s.tolist()
             )
             return np.array(list(map(nearest_float, balls)), complex).reshape(len(self.rows), s.size)
         if self.method != "closed-form":
@@ -343,7 +359,8 @@ def _finite(s: ArrayLike) -> Complex:
     largest = 1e20
     # False of NaN too
     if not all(abs(each) <= largest for each in ends):
-        worst = complex(points.ravel()[abs(points.ravel()).argmax()])  # of NaN its first
+        # of NaN its first
+        worst = complex(points.ravel()[abs(points.ravel()).argmax()])
         require(np.isfinite(worst), "s", worst, "a transfer function needs finite s in 1/s")
         require(False, "s", worst, f"at most {largest:g} 1/s")
     return points
@@ -371,7 +388,9 @@ class TransferPoints:
     @property
     def largest(
         self,
-    ) -> Annotated[float, Quantity("largest magnitude", help="largest |G| of these points", unit_of="gain_unit")]:
+    ) -> Annotated[
+        float, Quantity("largest magnitude", help="largest |G| of these points", unit_of="gain_unit")
+    ]:
         """The largest |G| at these points."""
         return float(abs(self._numbers).max())
 
@@ -391,7 +410,11 @@ class TransferPoints:
         """A row for each point."""
         first = roots_table(self.s, Quantity("s", "1 / s", 12)).columns
         value = self.value
-        pairs = zip(*value, strict=True) if isinstance(value, list) else (value.real.tolist(), value.imag.tolist())
+        pairs = (
+            zip(*value, strict=True)
+            if isinstance(value, list)
+            else (value.real.tolist(), value.imag.tolist())
+        )
         values = (
             Column(f"{part}_{self.output}", f"{part} {self.output}", self.gain_unit, of=list(of))
             for part, of in zip(("re", "im"), pairs, strict=True)
@@ -403,8 +426,12 @@ class TransferPoints:
 def values_at(G: TransferFunction, s: Complex, digits: int | None = None) -> TransferPoints:
     """Return the response at s, with certified digits for more than 15 of them."""
     right = digits or 0
-    value = np.asarray(G(s)) if right <= DOUBLE_DIGITS else [list(G.digits(complex(each), right)) for each in s]
-    return TransferPoints(s, value, G.arm.name, G.input, G.input_unit, G.outputs[0], G.units[0], G.x, G.method)
+    value = (
+        np.asarray(G(s)) if right <= DOUBLE_DIGITS else [list(G.digits(complex(each), right)) for each in s]
+    )
+    return TransferPoints(
+        s, value, G.arm.name, G.input, G.input_unit, G.outputs[0], G.units[0], G.x, G.method
+    )
 
 
 @dataclass(frozen=True)
@@ -412,12 +439,16 @@ class ByMethods:
     """The same numbers of an arm by each method, a row for each mode or point of `at`."""
 
     arm: Annotated[str, Quantity("arm", help="name of the arm")]
-    of: Annotated[str, Quantity("quantity", help="natural frequency, or the output of a response", key="output")]
+    of: Annotated[
+        str, Quantity("quantity", help="natural frequency, or the output of a response", key="output")
+    ]
     unit: Annotated[str, Quantity("unit", help="SI unit of the values")]
     at: Annotated[Sequence[Any], Quantity(help="numbers of the modes, or points s in 1/s")]
     values: Annotated[ByMethod, Quantity(help="values by method", flat=True)]
 
     @property
-    def rows(self) -> Annotated[list[MethodRow], Quantity("by method", help="a row a mode or point", key="rows")]:
+    def rows(
+        self,
+    ) -> Annotated[list[MethodRow], Quantity("by method", help="a row a mode or point", key="rows")]:
         """A row for each mode or point."""
         return self.values.rows(self.at)

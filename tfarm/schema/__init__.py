@@ -10,9 +10,8 @@ meaning from here.  `to_dict` and `sections` read a record, `table` records of o
 """
 
 from tfarm.moved import moved
-
-from .printed import Tabled
-from .quantities import (
+from tfarm.schema.printed import Tabled
+from tfarm.schema.quantities import (
     At,
     Difference,
     Percent,
@@ -24,7 +23,7 @@ from .quantities import (
     to_dict,
     with_unit,
 )
-from .tables import (
+from tfarm.schema.tables import (
     Column,
     RecordSection,
     Table,
@@ -68,4 +67,6 @@ __all__ = [
 ]
 
 # names up to version 1.0
-__getattr__ = moved(__name__, {"Section": "tfarm.schema:RecordSection", "compare": "tfarm.schema:compare_records"})
+__getattr__ = moved(
+    __name__, {"Section": "tfarm.schema:RecordSection", "compare": "tfarm.schema:compare_records"}
+)

@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Annotated
 
 from tfarm.errors import ParameterError, did_you_mean
-
-from .quantities import Quantity, quantities
+from tfarm.schema.quantities import Quantity, quantities
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +28,9 @@ class Term:
 class Declared:
     """A quantity of the results."""
 
-    label: Annotated[str, Quantity("quantity", key="quantity", help="label of the quantity in text, tables and pages")]
+    label: Annotated[
+        str, Quantity("quantity", key="quantity", help="label of the quantity in text, tables and pages")
+    ]
     unit: Annotated[str, Quantity("unit", help="SI unit; none of a ratio or a word")]
     meaning: Annotated[str, Quantity("meaning", help="definition, with its sign or limit convention")]
 
@@ -42,10 +43,12 @@ GLOSSARY_TERMS = tuple(sorted((*CERTAINTY, *TERMS), key=lambda term: term.name.c
 def declared_records() -> Iterator[tuple[type, dict[str, Quantity]]]:
     """Return every class of records with its quantities by attribute; imports the whole package."""
     for module in pkgutil.walk_packages([str(Path(__file__).parents[1])], "tfarm."):
-        if module.name == "tfarm.__main__":  # it acts when it is imported
+        # it acts when it is imported
+        if module.name == "tfarm.__main__":
             continue
         for kind in vars(import_module(module.name)).values():
-            with suppress(NameError):  # of a class whose annotations are for type checkers alone
+            # of a class whose annotations are for type checkers alone
+            with suppress(NameError):
                 if isinstance(kind, type) and kind.__module__ == module.name and quantities(kind):
                     yield kind, quantities(kind)
 
@@ -68,8 +71,12 @@ def glossary(words: str | None = None) -> Glossary:
 
     Raises ParameterError where there is none.
     """
-    every = {Declared(of.label, of.unit, of.help) for _, all_of in declared_records() for of in all_of.values()
-             if of.label and of.help}  # fmt: skip
+    every = {
+        Declared(of.label, of.unit, of.help)
+        for _, all_of in declared_records()
+        for of in all_of.values()
+        if of.label and of.help
+    }
     part = (words or "").casefold()
     terms = tuple(each for each in GLOSSARY_TERMS if part in each.name.casefold())
     in_order = sorted(every, key=lambda each: (each.label.casefold(), each.unit, each.meaning))

@@ -7,26 +7,47 @@ from jinja2 import Environment
 from markupsafe import Markup, escape
 
 from tfarm.digits import powers, unit
+from tfarm.schema.tables import Table
 
-from .tables import Table
-
-COMPLEX = re.compile(r"(?<=[\d)])([+-])(\d[\d.]*(?:e[+-]?\d+)?)i\b")  # the imaginary part of a number
+# the imaginary part of a number
+COMPLEX = re.compile(r"(?<=[\d)])([+-])(\d[\d.]*(?:e[+-]?\d+)?)i\b")
 # of a number in a cell
 SIGN = re.compile(r"(?<![\w.)])-(?=[\d.]|inf\b)")
 INFINITE = re.compile(r"\binf\b")
 TYPESET = {
-    "theta_t^2": "(dθ/dt)²", "theta_t": "dθ/dt", "phi_xt(0)": "∂φ′(0)/∂t", " theta": " θ", "phi'(0)": "φ′(0)",
-    "L(iw)": "L(iω)", "J w1": "J ω₁", "+-": "±",
-    "(alpha_c, eta_c)": "momentum and learning rate", "w^2 rhoA": "ω^2 rhoA", "w L^2": "ω L^2",
-}  # fmt: skip
+    "theta_t^2": "(dθ/dt)²",
+    "theta_t": "dθ/dt",
+    "phi_xt(0)": "∂φ′(0)/∂t",
+    " theta": " θ",
+    "phi'(0)": "φ′(0)",
+    "L(iw)": "L(iω)",
+    "J w1": "J ω₁",
+    "+-": "±",
+    "(alpha_c, eta_c)": "momentum and learning rate",
+    "w^2 rhoA": "ω^2 rhoA",
+    "w L^2": "ω L^2",
+}
 GREEK = {
-    "rho": "ρ", "kappa": "κ", "theta": "θ", "phi": "φ", "psi": "ψ", "lambda": "λ", "eta": "η", "alpha": "α", "nu": "ν",
-    "omega": "ω", "Theta": "Θ", "Phi": "Φ", "Psi": "Ψ", "Delta": "Δ",
-}  # fmt: skip
-LETTER = re.compile(rf"(?<![A-Za-z])({'|'.join(GREEK)})(?=[AI]\b|[^A-Za-z]|$)")  # rho, and of rhoA and rhoI
+    "rho": "ρ",
+    "kappa": "κ",
+    "theta": "θ",
+    "phi": "φ",
+    "psi": "ψ",
+    "lambda": "λ",
+    "eta": "η",
+    "alpha": "α",
+    "nu": "ν",
+    "omega": "ω",
+    "Theta": "Θ",
+    "Phi": "Φ",
+    "Psi": "Ψ",
+    "Delta": "Δ",
+}
+# rho, and of rhoA and rhoI
+LETTER = re.compile(rf"(?<![A-Za-z])({'|'.join(GREEK)})(?=[AI]\b|[^A-Za-z]|$)")
 ROOT = re.compile(r"\^\((1/\d)\)")
-MINUS = re.compile(r"(?<= )-(?= ?[\w(])")  # of a formula in a sentence
-WIDE_CELL = 44  # characters of a text from which its cell is a wide one
+# of a formula in a sentence
+MINUS = re.compile(r"(?<= )-(?= ?[\w(])")
 
 
 TABLE = Environment(autoescape=True).from_string("""<table aria-label="{{ table.title }}">
@@ -51,13 +72,25 @@ TABLE = Environment(autoescape=True).from_string("""<table aria-label="{{ table.
 
 def as_html(table: Table) -> Markup:
     """The table element, named by the table's title: words to the left, long ones wide, some with a background."""
+    # characters of a text from which its cell is a wide one
+    wide_cell = 44
     if not table.columns:
         return Markup('<p class="caption">none</p>')
     columns = [(each, ("text" * each.is_text, " tinted" * bool(each.tint))) for each in table.columns]
-    cells = (zip(each.cells, each.tint or repeat(""), each.helps or repeat(""), strict=False) for each in table.columns)
-    return Markup(TABLE.render(
-        table=table, columns=columns, rows=zip(*cells, strict=True), symbols=with_symbols, unit=unit, wide=WIDE_CELL
-    ))  # fmt: skip
+    cells = (
+        zip(each.cells, each.tint or repeat(""), each.helps or repeat(""), strict=False)
+        for each in table.columns
+    )
+    return Markup(
+        TABLE.render(
+            table=table,
+            columns=columns,
+            rows=zip(*cells, strict=True),
+            symbols=with_symbols,
+            unit=unit,
+            wide=wide_cell,
+        )
+    )
 
 
 def with_symbols(text: str) -> Markup:

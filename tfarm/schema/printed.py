@@ -7,6 +7,6 @@ class Tabled:
     """A record that prints as its `table`, then its `notes`."""
 
     def __str__(self) -> str:
-        from .terminal import table_lines
+        from tfarm.schema.terminal import table_lines
 
         return "\n".join([*table_lines(cast("Any", self).table), *getattr(self, "notes", ())])

@@ -10,13 +10,15 @@ import numpy as np
 
 from tfarm.digits import general, round_to_error
 
-SLUGS = {"s": "s", "m": "m", "rad/s": "rad_s", "Hz": "hz", "deg": "deg", "samples": "samples"}  # of units in keys
-COMPLEX_ERROR = 2e-14  # of the size of a pole or zero: what rounding leaves in its parts (tests: 1e-14 to 50 digits)
+# of units in keys
+SLUGS = {"s": "s", "m": "m", "rad/s": "rad_s", "Hz": "hz", "deg": "deg", "samples": "samples"}
+# of the size of a pole or zero: what rounding leaves in its parts (tests: 1e-14 to 50 digits)
+COMPLEX_ERROR = 2e-14
 NO_VALUE = "-"
-LONGEST_COMPARED = 28  # characters of a text that is compared: a word or an interval, and no sentence
-EMPTY = {"None", "", "[]", "()"}  # what is compared where neither has a value
-SAME = 4e-14  # of a value: what two computations of it may differ by
-NAMES = ("first", "second")  # of two records that have none
+# what is compared where neither has a value
+EMPTY = {"None", "", "[]", "()"}
+# of two records that have none
+NAMES = ("first", "second")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +96,9 @@ def quantities_of(record: Any, parent: Any = None) -> dict[str, Quantity]:
     found = dict(quantities(type(record)))
     for name, of in found.items():
         if name in titles or of.unit_of:
-            label, unit = titles.get(name, (of.label, getattr(record, of.unit_of, getattr(parent, of.unit_of, ""))))
+            label, unit = titles.get(
+                name, (of.label, getattr(record, of.unit_of, getattr(parent, of.unit_of, "")))
+            )
             found[name] = replace(of, label=label, unit=unit)
     return found
 
@@ -133,7 +137,9 @@ def entries(record: Any, under: str = "") -> Iterator[tuple[str, Quantity, Any]]
             value = value.as_text(of.digits)
         if is_declared(value) and not isinstance(value, At):
             yield from entries(value, f"{label}: ") if of.label else ()
-        elif of.label and not (of.curve or isinstance(value, np.ndarray | Mapping) or is_list_of_records(value)):
+        elif of.label and not (
+            of.curve or isinstance(value, np.ndarray | Mapping) or is_list_of_records(value)
+        ):
             yield label, of, value
 
 
@@ -160,7 +166,9 @@ def to_json_value(value: Any) -> Any:
     if value is None or type(value) in (float, int, str, bool):
         return value
     if is_table(value):
-        columns = {of.key: to_json_value(getattr(value, name)) for name, of in quantities(type(value)).items()}
+        columns = {
+            of.key: to_json_value(getattr(value, name)) for name, of in quantities(type(value)).items()
+        }
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     if is_declared(value):
         return to_dict(value)
@@ -184,7 +192,8 @@ def with_unit(value: Any, of: Quantity) -> str:
         at = "" if value.omega is None else f" at {value.omega:.6g} rad/s"
         return with_unit(value.value, of) + at
     shown = text(value, of.digits)
-    number, _, note = shown.partition(" (")  # of a figure, such as the modes for which it holds
+    # of a figure, such as the modes for which it holds
+    number, _, note = shown.partition(" (")
     after = f" ({note}" if note else ""
     return f"{number} {of.unit}{after}" if of.unit and shown not in ("", NO_VALUE) else shown
 
@@ -207,7 +216,11 @@ def text(value: Any, digits: int = 6) -> str:
     if isinstance(value, Mapping):
         return ", ".join(f"{key} {text(entry, digits)}" for key, entry in value.items())
     shown = ", ".join(text(entry, digits) for entry in value)
-    is_pair = isinstance(value, tuple) and len(value) == 2 and not any(isinstance(each, str | tuple) for each in value)
+    is_pair = (
+        isinstance(value, tuple)
+        and len(value) == 2
+        and not any(isinstance(each, str | tuple) for each in value)
+    )
     return f"({shown})" if is_pair else shown
 
 
@@ -234,7 +247,8 @@ class Difference(NamedTuple):
     unit: Annotated[str, Quantity("unit", help="unit of both values and of their difference")]
     one: Annotated[Any, Quantity("first", digits=8, help="value of the first record")]
     other: Annotated[Any, Quantity("second", digits=8, help="value of the second record")]
-    names: tuple[str, str] = NAMES  # of the records
+    # of the records
+    names: tuple[str, str] = NAMES
 
     @property
     def titles(self) -> dict[str, tuple[str, str]]:
@@ -242,8 +256,12 @@ class Difference(NamedTuple):
         return {"one": (self.names[0], ""), "other": (self.names[1], "")}
 
     @property
-    def difference(self) -> Annotated[float | None, Quantity("difference", digits=4, help="second less first")]:
+    def difference(
+        self,
+    ) -> Annotated[float | None, Quantity("difference", digits=4, help="second less first")]:
         """Second less first, in the unit; what rounding may leave is 0, and what is no number has none."""
+        # of a value: what two computations of it may differ by
+        same = 4e-14
         one = self.one
         other = self.other
         if any(isinstance(each, bool) or not isinstance(each, int | float) for each in (one, other)):
@@ -251,7 +269,7 @@ class Difference(NamedTuple):
         gap = 0.0 if one == other else float(other - one)
         if not math.isfinite(gap):
             return None
-        gap = 0.0 if abs(gap) <= SAME * abs(one) else gap
+        gap = 0.0 if abs(gap) <= same * abs(one) else gap
         return PercentagePoints(gap) if isinstance(one, Percent) else gap
 
 
@@ -265,10 +283,12 @@ def compare_records(one: Any, other: Any, names: tuple[str, str] = NAMES) -> lis
 
 
 def _of_records(one: Any, other: Any) -> Iterator[Difference]:
+    # characters of a text that is compared: a word or an interval, and no sentence
+    longest_compared = 28
     others = {label: value for label, _, value in entries(other)}
     for label, of, value in entries(one):
         both = [each.value if isinstance(each, At) else each for each in (value, others.get(label))]
-        is_short = of.is_number or len(str(value)) < LONGEST_COMPARED
+        is_short = of.is_number or len(str(value)) < longest_compared
         if label in others and is_short and not set(map(str, both)) <= EMPTY:
             yield Difference(label, of.unit, both[0], both[1])
     for (value, of, _), (match, *_) in zip(with_flat(one), with_flat(other), strict=False):

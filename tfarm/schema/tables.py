@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from tfarm.digits import TEXTS, CellsOf, round_to_error
-
-from .quantities import (
+from tfarm.schema.quantities import (
     COMPLEX_ERROR,
     EMPTY,
     NO_VALUE,
@@ -33,9 +32,6 @@ from .quantities import (
     with_flat,
     with_unit,
 )
-
-RATIO_DIGITS = 6  # of the damping ratio of a listed pole
-LONGEST_LINE = 40  # characters of a cell from which on it may be folded on a narrow terminal
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,14 +96,21 @@ class Table:
     def __post_init__(self) -> None:
         keys = [column.key for column in self.columns]
         assert len(set(keys)) == len(keys), f"{self.stem}: two columns of one key in {keys}"
-        assert len({len(column.of) for column in self.columns}) <= 1, f"{self.stem}: columns of different lengths"
+        assert len({len(column.of) for column in self.columns}) <= 1, (
+            f"{self.stem}: columns of different lengths"
+        )
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         keys = [column.key for column in self.columns]
-        return (dict(zip(keys, row, strict=True)) for row in zip(*(column.of for column in self.columns), strict=True))
+        return (
+            dict(zip(keys, row, strict=True))
+            for row in zip(*(column.of for column in self.columns), strict=True)
+        )
 
 
-def table(rows: Any, names: Sequence[str] = (), *, parent: Any = None, stem: str = "", title: str = "") -> Table:
+def table(
+    rows: Any, names: Sequence[str] = (), *, parent: Any = None, stem: str = "", title: str = ""
+) -> Table:
     """A row a record (or an entry of a record of columns), a column a quantity: those with a label, or these.
 
     A column without any value is left out unless it is named.  `parent` is the record that has these rows.
@@ -119,31 +122,47 @@ def table(rows: Any, names: Sequence[str] = (), *, parent: Any = None, stem: str
         if names or not values or any(value is not None and str(value) for value in values):
             of = declared[name]
             cells = [
-                NO_VALUE if isinstance(each, list | tuple) and not each else text(each, of.digits) for each in values
+                NO_VALUE if isinstance(each, list | tuple) and not each else text(each, of.digits)
+                for each in values
             ]
-            columns.append(Column(of.key, of.label, of.unit, of=list(map(to_json_value, values)), shown=cells,
-                                  folds=_folds(cells), help=of.help))  # fmt: skip
+            columns.append(
+                Column(
+                    of.key,
+                    of.label,
+                    of.unit,
+                    of=list(map(to_json_value, values)),
+                    shown=cells,
+                    folds=_folds(cells),
+                    help=of.help,
+                )
+            )
     return Table(columns=tuple(columns), stem=stem, title=title)
 
 
 def _folds(cells: Sequence[str]) -> bool:
     """Whether a column of these cells may be folded."""
-    return max(map(len, cells), default=0) > LONGEST_LINE
+    # characters of a cell from which on it may be folded on a narrow terminal
+    longest_line = 40
+    return max(map(len, cells), default=0) > longest_line
 
 
 def across(records: Mapping[str, Any], *, keys: Sequence[str] = (), title: str = "") -> Table:
     """A row a quantity that has one value, a column a record; the records are named, `keys` are those of columns."""
     found = [{label: (of, value) for label, of, value in entries(each)} for each in records.values()]
     known = {label: of for each in found for label, (of, _) in each.items()}
-    labels = [label for label in known if any(str(each[label][1]) not in EMPTY for each in found if label in each)]
+    labels = [
+        label for label in known if any(str(each[label][1]) not in EMPTY for each in found if label in each)
+    ]
     columns = [
         Column("quantity", "quantity", of=labels, helps=[known[label].help for label in labels]),
         Column("unit", "unit", of=[known[label].unit for label in labels]),
     ]
     for key, name, each in zip(keys or records, records, found, strict=True):
         pairs = [each.get(label, (Quantity(), None)) for label in labels]
-        values = [to_json_value(value.value if isinstance(value, At) and value.omega is None else value)
-                  for _, value in pairs]  # fmt: skip
+        values = [
+            to_json_value(value.value if isinstance(value, At) and value.omega is None else value)
+            for _, value in pairs
+        ]
         cells = [with_unit(value, replace(of, unit="")) for of, value in pairs]
         columns.append(Column(key, name, of=values, shown=cells, folds=_folds(cells)))
     return Table(columns=tuple(columns), title=title, leading=2)
@@ -151,15 +170,25 @@ def across(records: Mapping[str, Any], *, keys: Sequence[str] = (), title: str =
 
 def roots_table(values: Any, of: Quantity) -> Table:
     """A row a complex number: its real and imaginary part, and of a pole or zero in 1/s its damping ratio."""
+    # of the damping ratio of a listed pole
+    ratio_digits = 6
     roots = [complex(value) for value in values]
     shown = [round_parts(root, of.digits) for root in roots]
     columns = [
         Column("re", f"Re {of.label}", of.unit, of=[s.real for s in roots], shown=[re for re, _ in shown]),
-        Column("im", f"Im {of.label}", of.unit.replace("1/s", "rad/s"), of=[s.imag for s in roots],
-               shown=[im for _, im in shown]),
-    ]  # fmt: skip
+        Column(
+            "im",
+            f"Im {of.label}",
+            of.unit.replace("1/s", "rad/s"),
+            of=[s.imag for s in roots],
+            shown=[im for _, im in shown],
+        ),
+    ]
     if of.unit == "1/s":
-        ratios = [round_to_error(-s.real / abs(s), COMPLEX_ERROR, RATIO_DIGITS) if s.imag else NO_VALUE for s in roots]
+        ratios = [
+            round_to_error(-s.real / abs(s), COMPLEX_ERROR, ratio_digits) if s.imag else NO_VALUE
+            for s in roots
+        ]
         columns.append(Column("damping_ratio", "damping ratio", of=ratios))
     return Table(columns=tuple(columns))
 
@@ -175,7 +204,9 @@ def curve_table(record: Any) -> Table:
                 after = f"_{number}" if np.ndim(value) > 1 else ""
                 for part, numbers in (("re", values.real), ("im", values.imag)):
                     cells = ["" if math.isnan(each) else each for each in numbers.tolist()]
-                    columns.append(Column(f"{part}_{of.key}{after}", f"{part} {of.label}{after}", of.unit, of=cells))
+                    columns.append(
+                        Column(f"{part}_{of.key}{after}", f"{part} {of.label}{after}", of.unit, of=cells)
+                    )
         elif of.curve:
             columns.append(Column(of.key, of.label, of.unit, of=value))
         elif not columns and is_list_of_records(value):
@@ -231,7 +262,8 @@ def to_json(answer: Any, **how: Any) -> str:
     """
     try:
         return json.dumps(answer, allow_nan=False, default=list, **how)
-    except ValueError:  # of an infinity, which is a text in JSON, or of a NaN
+    except ValueError:
+        # of an infinity, which is a text in JSON, or of a NaN
         return json.dumps(json_value(answer), allow_nan=False, **how)
 
 
@@ -263,7 +295,9 @@ def as_csv(table: Table, *, units: bool = False) -> str:
     stream = io.StringIO()
     columns = table.columns
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([f"{column.key} [{column.unit}]" if units and column.unit else column.key for column in columns])
+    writer.writerow(
+        [f"{column.key} [{column.unit}]" if units and column.unit else column.key for column in columns]
+    )
     writer.writerows(zip(*map(_csv_cells, columns), strict=True))
     return stream.getvalue()
 

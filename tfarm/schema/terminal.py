@@ -17,13 +17,12 @@ from rich.console import Console, RenderableType
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from .tables import Column, RecordSection, Table, sections
+from tfarm.schema.tables import Column, RecordSection, Table, sections
 
-COLUMN_GAP = 2  # spaces between two columns
-LEAST_FOLDED = 20  # characters to which a text may be folded
+# spaces between two columns
+COLUMN_GAP = 2
 # columns of a pipe, and characters to which a text may be folded there
 PIPE_WIDTH = 120
-LEAST_IN_PIPE = 48
 
 
 def show(record: Any, rows: Table | None = None, last: str = "") -> None:
@@ -62,7 +61,8 @@ def first_and_last(table: Table, most: int = 40) -> tuple[Table, str]:
     number = len(table.columns[0].of)
     half = most // 2
     left_out = number - 2 * half
-    if left_out <= 1:  # a row of dots takes the place of one
+    # a row of dots takes the place of one
+    if left_out <= 1:
         return table, ""
     columns: list[Column] = []
 
@@ -73,14 +73,17 @@ def first_and_last(table: Table, most: int = 40) -> tuple[Table, str]:
         kept = replace(column, of=ends(column.of), shown=column.shown and ends(column.shown))
         dots = "..." if columns else f"... {left_out} rows"
         columns.append(replace(column, of=ends(column.of, None), shown=ends(kept.cells, dots)))
-    return replace(table, columns=tuple(columns)), f"rows left out: {left_out} of {number}; --csv FILE writes all"
+    return replace(
+        table, columns=tuple(columns)
+    ), f"rows left out: {left_out} of {number}; --csv FILE writes all"
 
 
 def pair_lines(pairs: Sequence[tuple[str, str]], width: int | None) -> list[str]:
     """Return the lines of labels and values one below the other; long values are folded."""
     labels, values = zip(*pairs, strict=True)
     columns = Column("label", of=labels), Column("value", of=values, folds=True)
-    return table_lines(Table(columns=columns), width)[1:]  # without their titles
+    # without their titles
+    return table_lines(Table(columns=columns), width)[1:]
 
 
 def terminal_width() -> int | None:
@@ -90,17 +93,23 @@ def terminal_width() -> int | None:
 
 def table_lines(table: Table, width: int | None = None) -> list[str]:
     """Return the lines of a table, each within `width` as far as its widest column allows; without one, for a pipe."""
+    # characters to which a text may be folded
+    least_folded = 20
+    least_in_pipe = 48
     columns = table.columns
     is_pipe = width is None
     width = width or PIPE_WIDTH
-    shortest = LEAST_IN_PIPE if is_pipe else LEAST_FOLDED
+    shortest = least_in_pipe if is_pipe else least_folded
     widths = [widest([each.heading, *each.cells]) for each in columns]
-    if sum(widths) + COLUMN_GAP * (len(widths) - 1) <= width:  # rich would take a second for two thousand rows
+    # rich would take a second for two thousand rows
+    if sum(widths) + COLUMN_GAP * (len(widths) - 1) <= width:
         aligned = [
-            [set_cell_size(cell, size) if is_text else " " * (size - cell_len(cell)) + cell
-             for cell in (each.heading, *each.cells)]
+            [
+                set_cell_size(cell, size) if is_text else " " * (size - cell_len(cell)) + cell
+                for cell in (each.heading, *each.cells)
+            ]
             for each, size, is_text in zip(columns, widths, [each.is_text for each in columns], strict=True)
-        ]  # fmt: skip
+        ]
         return [(" " * COLUMN_GAP).join(row).rstrip() for row in zip(*aligned, strict=True)]
     leading = columns[: table.leading]
     blocks: list[list[Column]] = [[*leading]]

@@ -23,14 +23,20 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 
-FORESEEN = 1.0  # so is one with a larger change of ln f at the rate of either end
-NEAREST_TO_ZERO = 1e-13  # a contour cannot be resolved closer to a zero than this share of |s|
-FIRST_POINTS = 40  # of each edge of a contour, before refinement
-MOST_CALLS = 30_000  # of the function in one search; the most that 300 random loops took is 4,100
-DEAD_ZONE = 1e-8  # of a box: nearer to s = 0 zeros of Newton's method are rejected, and a zero there forces cuts
-REAL_SHARE = 1e-11  # of its size: a smaller imaginary part is rounding
-TRIED_HEIGHTS = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)  # of a box, where a zero lies on its edge
-SPLIT = 0.4871  # of a side, where a box is cut: off the axes, on which zeros often are
+# so is one with a larger change of ln f at the rate of either end
+FORESEEN = 1.0
+# a contour cannot be resolved closer to a zero than this share of |s|
+NEAREST_TO_ZERO = 1e-13
+# of each edge of a contour, before refinement
+FIRST_POINTS = 40
+# of the function in one search; the most that 300 random loops took is 4,100
+MOST_CALLS = 30_000
+# of its size: a smaller imaginary part is rounding
+REAL_SHARE = 1e-11
+# of a box, where a zero lies on its edge
+TRIED_HEIGHTS = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)
+# of a side, where a box is cut: off the axes, on which zeros often are
+SPLIT = 0.4871
 
 
 Function = Callable[[Complex], Analytic]
@@ -70,7 +76,9 @@ class Box(NamedTuple):
         left, right, low, high = self
         if high - low >= right - left:
             cut = SPLIT * high if self.is_symmetric else _between(low, high)
-            return self._replace(im_min=-cut if self.is_symmetric else low, im_max=cut), self._replace(im_min=cut)
+            return self._replace(im_min=-cut if self.is_symmetric else low, im_max=cut), self._replace(
+                im_min=cut
+            )
         cut = _between(left, right)
         return self._replace(re_max=cut), self._replace(re_min=cut)
 
@@ -96,7 +104,9 @@ def winding_number(function: Function, box: Box, points: int = FIRST_POINTS) -> 
     return round(argument_change(function, np.append(path, corners[-1]), box.across) / turn)
 
 
-def argument_change(function: Function, path: Complex, across: float, nearest: float = NEAREST_TO_ZERO) -> float:
+def argument_change(
+    function: Function, path: Complex, across: float, nearest: float = NEAREST_TO_ZERO
+) -> float:
     """Return the change of the argument [rad] of a function along a path of points, which is refined.
 
     A step is halved above 0.6 rad.  Raises ConvergenceError where a zero is nearer to the path than the share `nearest`
@@ -111,7 +121,8 @@ def argument_change(function: Function, path: Complex, across: float, nearest: f
         length = end[0] - start[0]
         step = np.angle(np.exp(1j * (end[1] - start[1]).real))
         foreseen = abs(length) * np.maximum(abs(start[2]), abs(end[2]))
-        smooth = (abs(step) <= 0.6) & (foreseen <= FORESEEN)  # nan is not smooth
+        # nan is not smooth
+        smooth = (abs(step) <= 0.6) & (foreseen <= FORESEEN)
         angle += float(step[smooth].sum())
         start = start[:, ~smooth]
         end = end[:, ~smooth]
@@ -133,7 +144,8 @@ def _phase(function: Function, points: Complex) -> tuple[NDArray[np.float64], Co
     """Return arg f and f'/f, the rate of the first between two points."""
     at = function(points)
     phase: NDArray[np.float64] = np.angle(at.value) + at.scale.imag
-    with np.errstate(all="ignore"):  # a zero is a rough step
+    # a zero is a rough step
+    with np.errstate(all="ignore"):
         rate = np.where(at.value == 0, 0.0, at.slope / at.value)
     return phase, rate
 
@@ -154,7 +166,8 @@ def newton(
     many = longest = since = 0
     for step in range(60):
         at = function(s[moving])
-        with np.errstate(all="ignore"):  # a diverging start, or one at f' = 0, is dropped
+        # a diverging start, or one at f' = 0, is dropped
+        with np.errstate(all="ignore"):
             move: Complex = at.value / at.slope
         known = np.isfinite(move)
         settled[moving[~known]] = False
@@ -261,7 +274,9 @@ def zeros_in_box(function: Function, box: Box, starts: Complex, known: Complex =
     def counted(s: Complex) -> Analytic:
         if next(calls) > MOST_CALLS:
             raise ConvergenceError(
-                f"too many cuts below Im s = {box.im_max:.4g}: float64 does not separate the zeros there", s, 0
+                f"too many cuts below Im s = {box.im_max:.4g}: float64 does not separate the zeros there",
+                s,
+                0,
             )
         return function(s)
 
@@ -289,8 +304,12 @@ def complete_zeros(
     return np.where(abs(found.imag) < REAL_SHARE * abs(found), found.real, found), box
 
 
-def _search(function: Function, box: Box, starts: Complex, known: Complex, found: Complex, depth: int) -> Complex:
+def _search(
+    function: Function, box: Box, starts: Complex, known: Complex, found: Complex, depth: int
+) -> Complex:
     """Return all zeros in the box, by halves where some are missing; `found` are zeros of a larger box."""
+    # of a box: nearer to s = 0 zeros of Newton's method are rejected, and a zero there forces cuts
+    dead_zone = 1e-8
     expected = winding_number(function, box)
     mirrored = box.is_symmetric
     if not expected:
@@ -299,7 +318,8 @@ def _search(function: Function, box: Box, starts: Complex, known: Complex, found
 
     def listed(points: Complex) -> Complex:
         points = distinct(np.r_[points, points.conj()] if mirrored else points)
-        points = points[box.holds(points) & (abs(points) > DEAD_ZONE * width)]  # deflation at s = 0 leaves noise there
+        # deflation at s = 0 leaves noise there
+        points = points[box.holds(points) & (abs(points) > dead_zone * width)]
         again = (abs(points[:, None] - known) < 0.1 * abs(known)).any(axis=1)
         return np.concatenate([known[box.holds(known)], points[~again]])
 
@@ -309,10 +329,11 @@ def _search(function: Function, box: Box, starts: Complex, known: Complex, found
         grid = np.outer(box.corners, (0.8, 0.55)) + np.outer(np.roll(box.corners, 2), (0.2, 0.45))
         starts_here = np.concatenate([starts[box.holds(starts)], grid.ravel()])
         starts_here = starts_here[starts_here.imag >= 0] if mirrored else starts_here
-        if not depth or inside.size > expected:  # at first, and where rounding makes several points of one zero
+        # at first, and where rounding makes several points of one zero
+        if not depth or inside.size > expected:
             found = newton(function, starts_here, listed, expected)
             inside = listed(found)
-    missing = expected - inside.size - (abs(found) <= DEAD_ZONE * width).sum()
+    missing = expected - inside.size - (abs(found) <= dead_zone * width).sum()
     if missing > 0:
         missing = math.ceil(missing / (1 + mirrored))
         zeros = distinct(np.r_[known, found, found.conj()] if mirrored else np.r_[known, found])
@@ -328,7 +349,9 @@ def _search(function: Function, box: Box, starts: Complex, known: Complex, found
     # a box of 2^-30 of the first is below the resolution of float64
     if depth > 60:
         where = f"{box.re_min:.3g} < Re s < {box.re_max:.3g}, {box.im_min:.3g} < Im s < {box.im_max:.3g}"
-        raise ConvergenceError(f"only {inside.size} of {expected} zeros with {where} are separable", inside, expected)
+        raise ConvergenceError(
+            f"only {inside.size} of {expected} zeros with {where} are separable", inside, expected
+        )
     first, second = box.halves()
     parts = [_search(function, half, starts, known, found, depth + 1) for half in (first, second)]
     if mirrored and not second.is_symmetric:
@@ -336,10 +359,14 @@ def _search(function: Function, box: Box, starts: Complex, known: Complex, found
     return np.concatenate(parts)
 
 
-TOWARD_SINGULAR = 0.8  # of -1/C, where real eigenvalues accumulate: the farthest left edge of a box
-HEIGHTS_LEFT = 1.5  # width of a box left of the axis, in heights: zeros beyond are highly damped
-RIGHT_OF_AXIS = 0.1  # width of a box right of the axis, in heights: its edge is clear of zeros on the axis
-ABOVE_LAST = 1.05  # times the last known zero: a box may end half-way to that
+# of -1/C, where real eigenvalues accumulate: the farthest left edge of a box
+TOWARD_SINGULAR = 0.8
+# width of a box left of the axis, in heights: zeros beyond are highly damped
+HEIGHTS_LEFT = 1.5
+# width of a box right of the axis, in heights: its edge is clear of zeros on the axis
+RIGHT_OF_AXIS = 0.1
+# times the last known zero: a box may end half-way to that
+ABOVE_LAST = 1.05
 
 
 def is_among(zeros: Complex, others: Complex) -> NDArray[np.bool_]:

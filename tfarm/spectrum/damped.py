@@ -24,27 +24,22 @@ from tfarm.exact.characteristic import drive_of
 from tfarm.exact.system import System
 from tfarm.records import frozen
 from tfarm.schema import Quantity
+from tfarm.spectrum.box import TOWARD_SINGULAR, Box, complete_box, filled_box, is_among
+from tfarm.spectrum.following import LOST
+from tfarm.spectrum.frequencies import LISTS_KEPT
+from tfarm.spectrum.naming import function_of, name_eigenvalues
+from tfarm.spectrum.proofs import Disc, disjoint, enclose_zero, proven_count
+from tfarm.spectrum.shapes import mode_field
+from tfarm.spectrum.table import Modes, first_frequency, modes
 
-from .box import TOWARD_SINGULAR, Box, complete_box, filled_box, is_among
-from .following import LOST
-from .frequencies import LISTS_KEPT
-from .naming import function_of, name_eigenvalues
-from .proofs import Disc, disjoint, enclose_zero, proven_count
-from .shapes import mode_field
-from .table import Modes, first_frequency, modes
-
-COMPANY = 6  # modes named beyond the list: a box may end below them
-MOST_MODES = 300  # of a damped table
+# modes named beyond the list: a box may end below them
+COMPANY = 6
+# of a damped table
+MOST_MODES = 300
 # of the lowest frequency, and number: points of the negative real axis
-SLOWEST = 1e-6
-REAL_POINTS = 300
-DRIVE_PARTS = {
-    "friction": "hub friction",
-    "back_emf": "back-EMF",
-    "lag": "electrical pole",
-}  # parts that may determine a zero
 NOT_ASSIGNED = "not assigned"
-PART_STEP = Fraction(1, 10_000)  # of a part, for differences: float64 has D to 1e-15 of its terms
+# of a part, for differences: float64 has D to 1e-15 of its terms
+PART_STEP = Fraction(1, 10_000)
 
 
 class Unassigned(NamedTuple):
@@ -178,7 +173,10 @@ class DampedModes:
         zeros = self.eigenvalues[self.index > 0]
         unknown = np.full(share.size, complex(np.nan, np.nan))
         values = [
-            [mode_field(k, complex(zero), quantity, share.ravel()) if np.isfinite(zero) else unknown for zero in pair]
+            [
+                mode_field(k, complex(zero), quantity, share.ravel()) if np.isfinite(zero) else unknown
+                for zero in pair
+            ]
             for pair in zeros
         ]
         return np.array(values, dtype=complex).reshape(*zeros.shape, *share.shape)
@@ -231,7 +229,9 @@ def _searched(undamped: Modes, steps: float, reach: float) -> DampedModes:
     free = np.r_[single[single.imag != 0], unnamed]
     # zeros of the drive may be in the place of modes
     if free.size:
-        of_drive = np.reshape([each != NOT_ASSIGNED for each in origins_of(k, pairs.ravel())], pairs.shape).any(axis=1)
+        of_drive = np.reshape(
+            [each != NOT_ASSIGNED for each in origins_of(k, pairs.ravel())], pairs.shape
+        ).any(axis=1)
         free = np.r_[free, pairs[of_drive].ravel()]
         pairs[of_drive] = LOST
     for row in lost.tolist():
@@ -294,11 +294,18 @@ def origins_of(k: System, s: Complex) -> list[str]:
     By differences: ds = -dD/D'(s).  It is 1 for b in -b/J and -k/b and for the lag in -R/L_a, and 1/2 for both parts of
     a pair s^2 = -K^2/(J L_a).  For a mode it is as small as the effect of the dissipation on its frequency.
     """
-    parts = [part for part in DRIVE_PARTS if getattr(k.drive, part)]
+    # parts that may determine a zero
+    drive_parts = {
+        "friction": "hub friction",
+        "back_emf": "back-EMF",
+        "lag": "electrical pole",
+    }
+    parts = [part for part in drive_parts if getattr(k.drive, part)]
     if not parts:
         return [NOT_ASSIGNED] * s.size
     found: list[list[str]] = [[] for _ in s]
-    with np.errstate(invalid="ignore"):  # of zeros that are not known
+    # of zeros that are not known
+    with np.errstate(invalid="ignore"):
         here = function_of(k)(s)
         for part in parts:
             larger = k.drive._replace(**{part: getattr(k.drive, part) * (1 + PART_STEP)})
@@ -307,7 +314,7 @@ def origins_of(k: System, s: Complex) -> list[str]:
             # 0.3: |d ln s/d ln p| of the part p of an eigenvalue's origin: 1/2 for two parts
             is_large = abs(change / (here.slope * s)) > 0.3 * PART_STEP
             for n in np.flatnonzero(is_large).tolist():
-                found[n].append(DRIVE_PARTS[part])
+                found[n].append(drive_parts[part])
     return [" and ".join(names) or NOT_ASSIGNED for names in found]
 
 
@@ -317,13 +324,17 @@ def missing_real_eigenvalues(damped: DampedModes) -> Real:
     Friction at a hub without inertia, and a dashpot at clamp or joint, add one from -inf: it continues from no mode.
     Others may be of modes beyond the record.
     """
-    from scipy.optimize import brentq  # half a second to import, and not needed for an undamped arm
+    # of the lowest frequency, and number: points of the negative real axis
+    slowest = 1e-6
+    real_points = 300
+    # half a second to import, and not needed for an undamped arm
+    from scipy.optimize import brentq
 
     k = damped.undamped.system
     lowest = first_frequency(damped.undamped.arm)
     last = float(damped.natural_frequency.max())
     reach = TOWARD_SINGULAR / k.damping if k.damping else last
-    at = -np.geomspace(min(SLOWEST * lowest, reach / 2), reach, REAL_POINTS)
+    at = -np.geomspace(min(slowest * lowest, reach / 2), reach, real_points)
 
     def signed(s: Real) -> Real:
         drive, scale = drive_of(k, s + 0j)
@@ -335,7 +346,9 @@ def missing_real_eigenvalues(damped: DampedModes) -> Real:
     sides = np.sign(signed(at))
     passed = np.searchsorted(known, -at)
     new = np.flatnonzero((sides[1:] * sides[:-1] < 0) & (np.diff(passed) == 0))
-    return np.array([brentq(lambda s: float(signed(np.array([s]))[0]), at[n + 1], at[n], xtol=1e-300) for n in new])
+    return np.array(
+        [brentq(lambda s: float(signed(np.array([s]))[0]), at[n + 1], at[n], xtol=1e-300) for n in new]
+    )
 
 
 def damped_starts(arm: Arm, omega: Real) -> Complex:
@@ -354,7 +367,8 @@ def damped_starts(arm: Arm, omega: Real) -> Complex:
         product = omega**2 * rhoA / EI * (omega**2 * rhoI / kGA - 1)
         spread = np.sqrt(half_sum**2 - product)
         k2 = np.concatenate([half_sum + spread, half_sum - spread])
-        k2 = k2[k2 > 0]  # below the shear cut-off the second wave does not travel
+        # below the shear cut-off the second wave does not travel
+        k2 = k2[k2 > 0]
         c0 = EI / rhoI * kGA / rhoA * k2**2
         c1 = EI * C / rhoI * kGA / rhoA * k2**2
         c2 = kGA / rhoA * k2 + kGA / rhoI + EI / rhoI * k2

@@ -20,11 +20,13 @@ from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 from tfarm.exact.compiled import compiled, inlined
 
-NEWTON_STEPS = 8  # from a close guess: others are followed in shorter steps
-SETTLED = 1e-10  # of its size: the largest last step of a converged zero
+# from a close guess: others are followed in shorter steps
+NEWTON_STEPS = 8
+# of its size: the largest last step of a converged zero
+SETTLED = 1e-10
 LOST = complex(np.nan, np.nan)
-PAST = 4  # values of the predicting polynomials
-PLAIN_MOVE = 0.1  # of the distance to the next root: largest distance from the prediction
+# values of the predicting polynomials
+PAST = 4
 
 
 def polish_roots(function: Callable[..., Analytic], guess: Complex, *values: Real) -> Complex:
@@ -79,7 +81,8 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
     A root is lost at a singular point, and where it is next to no root of the complete set.
     Raises ConvergenceError after too many halvings, with the last value, its roots, and which of them are stray.
     """
-    start = start.copy()  # kernels are compiled anew for read-only arrays
+    # kernels are compiled anew for read-only arrays
+    start = start.copy()
     rows = np.full((values.size, start.size), np.nan, complex)
     rows[0] = start
     # known values and roots, and the values to come, the next one last, each with its row in the result or 0
@@ -108,7 +111,9 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
                 ahead.append(((before + float(at[0])) / 2, 0))
                 halvings += 1
                 if halvings > family.most_halvings:
-                    raise ConvergenceError(f"branches are not separable beyond {before:.10g}", past[-1], stray)
+                    raise ConvergenceError(
+                        f"branches are not separable beyond {before:.10g}", past[-1], stray
+                    )
             elif not good:
                 good = 1
                 near = assign_roots(family, float(at[0]), guess[0])
@@ -172,7 +177,8 @@ def is_over(family: Family, value: float, row: Complex) -> NDArray[np.bool_]:
 
 def assign_roots(family: Family, value: float, guess: Complex) -> Complex:
     """Return the complete set at a value in the order of the guesses (b,); NaN where there are fewer."""
-    from scipy.optimize import linear_sum_assignment  # half a second to import, and rarely needed
+    # half a second to import, and rarely needed
+    from scipy.optimize import linear_sum_assignment
 
     every = family.complete(value, guess)
     alive = np.flatnonzero(~np.isnan(guess))
@@ -225,7 +231,9 @@ def predict_roots(at: Any, rows: Any, wanted: Any, base: Any) -> Any:
             for i in range(base.size):
                 j = partner[i]
                 if j >= i and np.isnan(guess[m, i]):
-                    guess[m, i], guess[m, j] = _of_couple(weights[low:], rows[low:, i], rows[low:, j], base[i], base[j])
+                    guess[m, i], guess[m, j] = _of_couple(
+                        weights[low:], rows[low:, i], rows[low:, j], base[i], base[j]
+                    )
                 elif j < 0 and np.isnan(guess[m, i]):
                     guess[m, i] = _of_one(weights[low:], rows[low:, i], rows[low:, i], base[i])
     return guess
@@ -279,6 +287,8 @@ def which_plain(guess: Any, found: Any, base: Any, singular: Any, blur: float) -
 
     Others include `singular` points (m, p) and the mirror image of a root without one in the base (b,).
     """
+    # of the distance to the next root: largest distance from the prediction
+    plain_move = 0.1
     is_plain = np.isnan(guess)
     for m in range(len(found)):
         index, away = nearest(found[m])
@@ -295,8 +305,8 @@ def which_plain(guess: Any, found: Any, base: Any, singular: Any, blur: float) -
             if base[i].imag != 0.0 and np.all(base != base[i].conjugate()):
                 room = min(room, 2.0 * min(abs(here.imag), abs(base[i].imag)))
             same_side = np.sign(here.imag) == np.sign(guess[m, i].imag)
-            near = same_side and moved <= (2.0 * PLAIN_MOVE if is_couple else PLAIN_MOVE) * away[i]
+            near = same_side and moved <= (2.0 * plain_move if is_couple else plain_move) * away[i]
             is_plain[m, i] |= moved <= blur or (
-                (near or guess[m, i] == 0.0 or here == 0.0) and moved <= PLAIN_MOVE * room
+                (near or guess[m, i] == 0.0 or here == 0.0) and moved <= plain_move * room
             )
     return is_plain

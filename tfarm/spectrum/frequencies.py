@@ -33,10 +33,13 @@ from tfarm.records import read_only
 
 def counts_below(k: System, omega: Real) -> Whole:
     """Return the number of natural frequencies below each omega (1-D, positive) [rad/s], with the rigid-body mode."""
-    return np.asarray(chain_counts(np.ascontiguousarray(omega, dtype=float), *rows_to_count(Layout(k.undamped))))
+    return np.asarray(
+        chain_counts(np.ascontiguousarray(omega, dtype=float), *rows_to_count(Layout(k.undamped)))
+    )
 
 
-MOST_AXIS_BITS = 40_000  # of working precision: a root that needs more is double
+# of working precision: a root that needs more is double
+MOST_AXIS_BITS = 40_000
 
 
 def real_waves(a: Ball, b: Ball, g: Ball, S: Ball) -> tuple[tuple[Ball, ...], tuple[Ball, ...]]:
@@ -118,7 +121,9 @@ class AxisSweep(Sweep):
         self._free = 2
         return inside
 
-    def _count_segment(self, z: Sequence[Ball], p: SolutionPlane, q: SolutionPlane, r: Sequence[Ball]) -> None:
+    def _count_segment(
+        self, z: Sequence[Ball], p: SolutionPlane, q: SolutionPlane, r: Sequence[Ball]
+    ) -> None:
         outside = self.number
         pinned = pinned_count(z)
         if pinned is None:
@@ -199,9 +204,10 @@ def axis_precisions(digits: int) -> Iterator[int]:
         bits *= 2
 
 
-PAIR_REACH = 4e-6  # relative width around each of a close pair in float64
-LISTS_KEPT = 32  # lists of modes in a cache
-ARMS_KEPT = 64  # arms whose single numbers are in the cache
+# lists of modes in a cache
+LISTS_KEPT = 32
+# arms whose single numbers are in the cache
+ARMS_KEPT = 64
 
 
 def natural_frequencies(k: System, first: int, last: int) -> Real:
@@ -248,8 +254,10 @@ def list_frequencies(systems: Sequence[System], first: int, last: int) -> None:
 
 def _separated(k: System, omega: float, number: int) -> float:
     """Return the frequency of that number next to omega, close to another, by the count in balls."""
-    low = omega * (1 - PAIR_REACH)
-    high = omega * (1 + PAIR_REACH)
+    # relative width around each of a close pair in float64
+    pair_reach = 4e-6
+    low = omega * (1 - pair_reach)
+    high = omega * (1 + pair_reach)
     # 256 of working precision, for a double frequency to its last float64 digit
     with precision(256):
         axis = RealAxis(k)
@@ -267,7 +275,8 @@ def count_below(k: System, omega: float) -> int:
 
 def _estimate(k: System, last: int) -> float:
     """Return the Euler-Bernoulli estimate [rad/s] of a frequency above number `last`."""
-    transit = math.fsum(float(each.g) ** 0.25 for each in k.segments)  # [s^(1/2)]
+    # [s^(1/2)]
+    transit = math.fsum(float(each.g) ** 0.25 for each in k.segments)
     return float(((last + 1) * math.pi) ** 2 / transit**2)
 
 

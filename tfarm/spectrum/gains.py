@@ -15,15 +15,19 @@ from tfarm.errors import require
 from tfarm.spectrum.frequencies import ARMS_KEPT
 from tfarm.spectrum.table import first_frequency
 
-PAPER_GAINS = HubFeedback(K1=0.3, K2=0.3)  # of the paper's arms
-RATE_SHARE = 6.42e-3  # of J w1: K1 = 0.3 N m s/rad on the preset sasaki2012
-LEAST_UNITS = 1e-12  # of J w1, 1 and J w1^2: a smaller gain moves no pole in a lifetime
-MOST_UNITS = 1e9  # of J w1, 1 and J w1^2: practically infinite, far from overflow
-DEFAULT_DIGITS = 3  # of a default K1
+# of the paper's arms
+PAPER_GAINS = HubFeedback(K1=0.3, K2=0.3)
+# of J w1: K1 = 0.3 N m s/rad on the preset sasaki2012
+RATE_SHARE = 6.42e-3
+# of J w1, 1 and J w1^2: a smaller gain moves no pole in a lifetime
+LEAST_UNITS = 1e-12
+# of J w1, 1 and J w1^2: practically infinite, far from overflow
+MOST_UNITS = 1e9
+# of a default K1
+DEFAULT_DIGITS = 3
 # Section, hub and payload of the paper's arms, with density [kg/m^3] and C [s] as in their presets.
 PAPER_SECTION = Section.general(area=6e-4, second_moment=1.8e-9, shear_factor=5 / 6)
 PAPER_ENDS = Hub(inertia=0.1), Payload()
-PAPER_MATERIALS = ((2766.7, 0.0), (2766.7, 1e-4), (2.7667, 0.0))
 
 
 @lru_cache(maxsize=ARMS_KEPT)  # each loop of a search checks its gains
@@ -97,7 +101,8 @@ def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
 
 def _is_of_the_paper(arm: Arm) -> bool:
     """Whether link, hub and payload are those of one of the paper's presets."""
+    paper_materials = ((2766.7, 0.0), (2766.7, 1e-4), (2.7667, 0.0))
     link = arm.link
-    is_material = (link.density, link.damping) in PAPER_MATERIALS
+    is_material = (link.density, link.damping) in paper_materials
     is_link = (link.length, link.youngs_modulus, link.shear_modulus) == (1.0, 6.8944e10, 2.6517e10)
     return is_material and is_link and (link.section, arm.hub, arm.payload) == (PAPER_SECTION, *PAPER_ENDS)

@@ -10,16 +10,16 @@ from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.exact.values import Method
 from tfarm.schema import Quantity
-
-from .damped import MOST_MODES, DampedModes, Unassigned, damped_modes
-from .proofs import Certificate, Disc
-from .table import Modes, compare_theories, hub_locked
+from tfarm.spectrum.damped import MOST_MODES, DampedModes, Unassigned, damped_modes
+from tfarm.spectrum.proofs import Certificate, Disc
+from tfarm.spectrum.table import Modes, compare_theories, hub_locked
 
 LOCKED_NOTE = (
     "frequencies with a locked hub, as dry friction mostly locks it after a slew; a measured frequency "
     "near this column indicates a hub at rest"
 )
-SHAPE_DIGITS = 10  # in a report's files, of numbers from shapes, which differ by 1e-14 between processors
+# in a report's files, of numbers from shapes, which differ by 1e-14 between processors
+SHAPE_DIGITS = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,9 @@ class ListedMode:
     """One mode.  Frequencies are texts for more than 15 digits."""
 
     index: Annotated[int, Quantity("mode", help="number of the mode; 0 is the rigid body")]
-    natural_frequency: Annotated[float | str, Quantity("natural frequency", "rad/s", 12, "of the undamped arm")]
+    natural_frequency: Annotated[
+        float | str, Quantity("natural frequency", "rad/s", 12, "of the undamped arm")
+    ]
     natural_frequency_hz: Annotated[
         float, Quantity("frequency", "Hz", 9, "natural frequency over 2 pi", key="natural_frequency_hz")
     ]
@@ -35,19 +37,32 @@ class ListedMode:
     second_eigenvalue: Annotated[
         float | None, Quantity("second eigenvalue", "1/s", 8, "faster one of an overdamped mode")
     ]
-    damping_ratio: Annotated[float | None, Quantity("damping ratio", help="-Re s/|s|; above 1 for an overdamped mode")]
+    damping_ratio: Annotated[
+        float | None, Quantity("damping ratio", help="-Re s/|s|; above 1 for an overdamped mode")
+    ]
     hub_locked: Annotated[float | str | None, Quantity("hub locked", "rad/s", 12, LOCKED_NOTE)]
-    hub_participation: Annotated[float, Quantity(
-        "hub participation b", "rad/sqrt(kg m^2)", help="hub angle of the mode of unit modal mass"
-    )]  # fmt: skip
-    modal_moment: Annotated[float, Quantity(
-        "modal moment", "N m/sqrt(kg m^2)", help="root moment of the mode of unit modal mass"
-    )]  # fmt: skip
-    nodes: Annotated[list[float], Quantity("nodes", "m", 4, "points of the link without displacement, from the hub")]
-    theories: Annotated[dict[str, float], Quantity(key="theories_rad_s", help="natural frequency by each beam theory")]
-    sensitivity: Annotated[dict[str, float], Quantity(help="d ln w/d ln p, relative change of frequency by parameter")]
-    lower: Annotated[str | None, Quantity(key="lower_rad_s", help="lower end of the certified bracket")] = None
-    upper: Annotated[str | None, Quantity(key="upper_rad_s", help="upper end of the certified bracket")] = None
+    hub_participation: Annotated[
+        float,
+        Quantity("hub participation b", "rad/sqrt(kg m^2)", help="hub angle of the mode of unit modal mass"),
+    ]
+    modal_moment: Annotated[
+        float, Quantity("modal moment", "N m/sqrt(kg m^2)", help="root moment of the mode of unit modal mass")
+    ]
+    nodes: Annotated[
+        list[float], Quantity("nodes", "m", 4, "points of the link without displacement, from the hub")
+    ]
+    theories: Annotated[
+        dict[str, float], Quantity(key="theories_rad_s", help="natural frequency by each beam theory")
+    ]
+    sensitivity: Annotated[
+        dict[str, float], Quantity(help="d ln w/d ln p, relative change of frequency by parameter")
+    ]
+    lower: Annotated[str | None, Quantity(key="lower_rad_s", help="lower end of the certified bracket")] = (
+        None
+    )
+    upper: Annotated[str | None, Quantity(key="upper_rad_s", help="upper end of the certified bracket")] = (
+        None
+    )
     discs: Annotated[tuple[Disc, ...] | None, Quantity(help="certified enclosures of the eigenvalues")] = None
 
 
@@ -62,15 +77,27 @@ class ModeList:
     found: Modes
     damped: DampedModes | None
     modes: Annotated[list[ListedMode], Quantity("modes", help="in ascending order of natural frequency")]
-    unassigned: Annotated[list[Unassigned], Quantity(
-        "eigenvalues of no mode", help="in the box, assigned to no mode for certain", key="unassigned_eigenvalues"
-    )]  # fmt: skip
-    method: Annotated[Method, Quantity("method", help="of the natural frequencies: closed-form, balls or appendix")]
+    unassigned: Annotated[
+        list[Unassigned],
+        Quantity(
+            "eigenvalues of no mode",
+            help="in the box, assigned to no mode for certain",
+            key="unassigned_eigenvalues",
+        ),
+    ]
+    method: Annotated[
+        Method, Quantity("method", help="of the natural frequencies: closed-form, balls or appendix")
+    ]
     digits: Annotated[int | None, Quantity(help="digits of the natural frequencies, if more than 15")]
-    proof: Annotated[Certificate | None, Quantity("certified", help="brackets, and a count that proves them complete")]
+    proof: Annotated[
+        Certificate | None, Quantity("certified", help="brackets, and a count that proves them complete")
+    ]
     damped_failure: Annotated[str | None, Quantity("damped modes not determined", help="the reason")]
     is_proven_in_box: Annotated[
-        bool, Quantity(key="proven_complete_in_box", help="whether the list of eigenvalues in the box is certified")
+        bool,
+        Quantity(
+            key="proven_complete_in_box", help="whether the list of eigenvalues in the box is certified"
+        ),
     ]
 
     @property
@@ -79,7 +106,9 @@ class ModeList:
         return self.found.arm.name
 
     @property
-    def theory(self) -> Annotated[str, Quantity("beam theory", help="timoshenko, shear, rayleigh or euler-bernoulli")]:
+    def theory(
+        self,
+    ) -> Annotated[str, Quantity("beam theory", help="timoshenko, shear, rayleigh or euler-bernoulli")]:
         """The theory of the beam."""
         return self.found.theory
 
@@ -89,12 +118,16 @@ class ModeList:
         return self.found.arm.input
 
     @property
-    def count(self) -> Annotated[int, Quantity("flexible modes, none missing", help="number of the last mode")]:
+    def count(
+        self,
+    ) -> Annotated[int, Quantity("flexible modes, none missing", help="number of the last mode")]:
         """The number of the last mode."""
         return int(self.found.index.max())
 
     @property
-    def certainty(self) -> Annotated[str, Quantity("completeness", help="word of certainty for the list of modes")]:
+    def certainty(
+        self,
+    ) -> Annotated[str, Quantity("completeness", help="word of certainty for the list of modes")]:
         """The word of certainty for the list of modes."""
         return "converged (counted)" if self.proof is None else "certified"
 
@@ -102,7 +135,8 @@ class ModeList:
     def box(
         self,
     ) -> Annotated[
-        tuple[float, ...] | None, Quantity("box: Re s from, to, Im s from, to", "1/s", help="searched for eigenvalues")
+        tuple[float, ...] | None,
+        Quantity("box: Re s from, to, Im s from, to", "1/s", help="searched for eigenvalues"),
     ]:
         """The box of the eigenvalues."""
         return None if self.damped is None else tuple(self.damped.box)
@@ -110,12 +144,16 @@ class ModeList:
     @property
     def eigenvalues_in_box(
         self,
-    ) -> Annotated[int | None, Quantity("eigenvalues in the box, all listed", help="counted with conjugates")]:
+    ) -> Annotated[
+        int | None, Quantity("eigenvalues in the box, all listed", help="counted with conjugates")
+    ]:
         """Their number, with conjugates."""
         return None if self.damped is None else self.damped.count
 
     @property
-    def box_note(self) -> Annotated[str | None, Quantity("beyond the box", help="eigenvalues that no finite box has")]:
+    def box_note(
+        self,
+    ) -> Annotated[str | None, Quantity("beyond the box", help="eigenvalues that no finite box has")]:
         """The eigenvalues beyond the box, in words."""
         return None if self.damped is None else beyond_the_box(self.found.arm)
 
@@ -137,7 +175,11 @@ class ModeList:
         if without:
             notes.append(f"no eigenvalue is assigned for certain to mode {', '.join(map(str, without))}")
         if self.damped.left_out:
-            why = f"a list has at most {MOST_MODES}" if last == MOST_MODES else "the box of more could not be searched"
+            why = (
+                f"a list has at most {MOST_MODES}"
+                if last == MOST_MODES
+                else "the box of more could not be searched"
+            )
             notes.append(f"eigenvalues up to mode {last} only: {why}")
         return "; ".join(notes) or None
 
@@ -146,7 +188,9 @@ class ModeList:
         self,
     ) -> Annotated[
         list[float],
-        Quantity("of the motor's circuit [1/s]", help="real eigenvalues of no mode", key="circuit_eigenvalues"),
+        Quantity(
+            "of the motor's circuit [1/s]", help="real eigenvalues of no mode", key="circuit_eigenvalues"
+        ),
     ]:
         """Real eigenvalues of the motor's circuit."""
         return [] if self.damped is None else list(self.damped.others)
@@ -174,13 +218,21 @@ def listed_modes(
             failure = f"damped modes: {error}"
     rows = list(_rows(found, digits, method, damped, proof, discs))
     free = () if damped is None else damped.unassigned
-    enclosed = [None] * len(free) if discs is None else [tuple(each) for each in discs[len(discs) - len(free) :]]
+    enclosed = (
+        [None] * len(free) if discs is None else [tuple(each) for each in discs[len(discs) - len(free) :]]
+    )
     unassigned = [each._replace(discs=disc) for each, disc in zip(free, enclosed, strict=True)]
     return ModeList(
-        found=found, damped=damped, modes=rows, unassigned=unassigned, method=method,
-        digits=digits, proof=proof, damped_failure=failure,
+        found=found,
+        damped=damped,
+        modes=rows,
+        unassigned=unassigned,
+        method=method,
+        digits=digits,
+        proof=proof,
+        damped_failure=failure,
         is_proven_in_box=discs is not None,
-    )  # fmt: skip
+    )
 
 
 def _rows(
@@ -208,15 +260,22 @@ def _rows(
     for row in range(len(found)):
         first, second, ratio = (None, None, None) if damped is None else _damped(damped, row)
         yield ListedMode(
-            index=int(found.index[row]), natural_frequency=omega[row], natural_frequency_hz=hertz[row],
-            eigenvalue=first, second_eigenvalue=second, damping_ratio=ratio,
+            index=int(found.index[row]),
+            natural_frequency=omega[row],
+            natural_frequency_hz=hertz[row],
+            eigenvalue=first,
+            second_eigenvalue=second,
+            damping_ratio=ratio,
             hub_locked=None if row < rigid else still[row - rigid],
-            hub_participation=float(found.hub_participation[row]), modal_moment=float(found.modal_moment[row]),
+            hub_participation=float(found.hub_participation[row]),
+            modal_moment=float(found.modal_moment[row]),
             nodes=found.nodes[row].tolist(),
             theories={str(name): float(values[row]) for name, values in theories.items()},
             sensitivity={name: float(values[row]) for name, values in sensitivity.items()},
-            lower=brackets[row][0], upper=brackets[row][1], discs=enclosures.get(int(found.index[row])),
-        )  # fmt: skip
+            lower=brackets[row][0],
+            upper=brackets[row][1],
+            discs=enclosures.get(int(found.index[row])),
+        )
 
 
 def _damped(damped: DampedModes, row: int) -> tuple[complex | None, float | None, float | None]:
@@ -224,12 +283,15 @@ def _damped(damped: DampedModes, row: int) -> tuple[complex | None, float | None
     if row >= len(damped.index) or not damped.is_assigned[row]:
         return None, None, None
     p, q = damped.eigenvalues[row].tolist()
-    turning = damped.index[row] == 0 and q != 0  # friction at the hub
+    # friction at the hub
+    turning = damped.index[row] == 0 and q != 0
     both = (damped.is_overdamped[row] or turning) and not math.isnan(q.real)
     return p, q.real if both else None, float(damped.damping_ratio[row])
 
 
-def _discs_by_mode(damped: DampedModes | None, discs: Sequence[Sequence[Disc]] | None) -> dict[int, tuple[Disc, ...]]:
+def _discs_by_mode(
+    damped: DampedModes | None, discs: Sequence[Sequence[Disc]] | None
+) -> dict[int, tuple[Disc, ...]]:
     """Return the discs of each mode by its number, also of the rigid body with friction."""
     if damped is None or discs is None:
         return {}

@@ -19,14 +19,16 @@ from tfarm.exact.layout import OF_ELEMENT, ROW, OutputFormula, readings
 from tfarm.exact.sweep import AXIS, fill_free
 from tfarm.exact.system import Segment, System
 from tfarm.records import read_only
+from tfarm.spectrum.box import REAL_SHARE, Function, newton
+from tfarm.spectrum.following import LOST, NEWTON_STEPS, SETTLED, follow, polish_roots
+from tfarm.spectrum.table import Modes, modes
 
-from .box import REAL_SHARE, Function, newton
-from .following import LOST, NEWTON_STEPS, SETTLED, follow, polish_roots
-from .table import Modes, modes
-
-HALVINGS = (250, *[80] * 8)  # of steps, after which stray branches are lost and the others followed
-AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])  # starts next to a guess, of it
-NO_OUTPUT = np.empty((0, len(OutputFormula._fields)))  # the table of a layout
+# of steps, after which stray branches are lost and the others followed
+HALVINGS = (250, *[80] * 8)
+# starts next to a guess, of it
+AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])
+# the table of a layout
+NO_OUTPUT = np.empty((0, len(OutputFormula._fields)))
 
 
 def function_of(k: System) -> Function:
@@ -104,7 +106,8 @@ class Damping:
         found = guess / units
         (rows, of_rows) = self.rows
         (ends, of_ends) = self.ends
-        rows = read_only((rows + values[:, None, None] * of_rows).view(ROW)[..., 0])  # as those of a layout are
+        # as those of a layout are
+        rows = read_only((rows + values[:, None, None] * of_rows).view(ROW)[..., 0])
         ends = read_only(ends + values[:, None] * of_ends)
         for n, here in enumerate(found):
             _newton(here, rows[n], ends[n], self.at_rest, self.points / values[n])
@@ -149,7 +152,9 @@ def name_eigenvalues(undamped: Modes, count: int, steps: float) -> tuple[Complex
     if k.is_undamped:
         return np.array(alone, complex), 1j * np.outer(omega, [1, -1])
     family = Damping(k, k.damping or 1.0, HALVINGS[0], steps)
-    is_elastic = replace(k, elements=tuple(each for each in k.elements if not isinstance(each, Segment))).is_undamped
+    is_elastic = replace(
+        k, elements=tuple(each for each in k.elements if not isinstance(each, Segment))
+    ).is_undamped
     sizes = [omega[-1] * k.damping, *(abs(each) / omega[0] for each in alone), 0.0 if is_elastic else 1.0]
     # so small that an eigenvalue is close to its undamped value
     share = min(1.0, 1e-3 / max(sizes))
@@ -169,8 +174,10 @@ def name_eigenvalues(undamped: Modes, count: int, steps: float) -> tuple[Complex
             stray = lost.residual
             start = np.where(stray, LOST, start)
     found = np.full(start.size, LOST) if ends else polish_roots(function_of(k), start / family.level)
-    with np.errstate(invalid="ignore"):  # of lost ones
-        found[~has_slope(k, found)] = LOST  # so far out that Newton's method converges anywhere
+    # of lost ones
+    with np.errstate(invalid="ignore"):
+        # so far out that Newton's method converges anywhere
+        found[~has_slope(k, found)] = LOST
     again = np.triu(abs(found[:, None] - found) <= REAL_SHARE * abs(found), 1).any(axis=0)
     found[again] = LOST
     return in_pairs(found[: len(alone)], found[len(alone) :].reshape(-1, 2))
@@ -183,7 +190,8 @@ def in_pairs(single: Complex, pairs: Complex) -> tuple[Complex, Complex]:
     """
     single = single.copy()
     pairs = pairs.copy()
-    for n in (*range(len(pairs)), *range(len(pairs))):  # twice, as one of two may have half of another pair
+    # twice, as one of two may have half of another pair
+    for n in (*range(len(pairs)), *range(len(pairs))):
         rings = np.flatnonzero(np.isfinite(pairs[n]) & (pairs[n].imag != 0))
         if rings.size == 1:
             one = pairs[n, rings[0]]

@@ -40,13 +40,11 @@ from tfarm.exact.characteristic import Feedback, characteristic_over, tangent
 from tfarm.exact.system import System
 from tfarm.records import frozen
 from tfarm.schema import Quantity
+from tfarm.spectrum.box import Box
+from tfarm.spectrum.frequencies import RealAxis, axis_precisions, secant
 
-from .box import Box
-from .frequencies import RealAxis, axis_precisions, secant
-
-COUNTED_AT = tuple(Fraction(*share) for share in ((1, 2), (2, 5), (3, 5), (1, 7), (6, 7)))  # of a gap: tried in turn
-MOST_DECIMALS = 20_000  # of an exact decimal: more than any bracket has
-COUNTING_BITS = (128, 512, 4096)  # of working precision there: a count is certain unless it is on a half wave
+# of a gap: tried in turn
+COUNTED_AT = tuple(Fraction(*share) for share in ((1, 2), (2, 5), (3, 5), (1, 7), (6, 7)))
 
 
 @frozen(slots=True)
@@ -94,16 +92,20 @@ def _bracket(k: System, omega: float, digits: int) -> tuple[Fraction, Fraction]:
         upper = (int(number) + 1) * unit
         return (lower, upper) if axis.drive(rational(lower)) * axis.drive(rational(upper)) < 0 else None
 
-    text = f"no certified sign change in {digits} digits near {omega:.15g} rad/s: a double or a very close pair"
+    text = (
+        f"no certified sign change in {digits} digits near {omega:.15g} rad/s: a double or a very close pair"
+    )
     return first_success(axis_precisions(digits), attempt, CertificationError(text))
 
 
 def _count_above(k: System, last: Fraction, above: float) -> tuple[int, str]:
     """Return a certified count between the last bracket and the next frequency, and its frequency."""
+    # of working precision there: a count is certain unless it is on a half wave
+    counting_bits = (128, 512, 4096)
     gap = Fraction(above) - last
     for share in COUNTED_AT:
         point = Fraction(float(last + gap * share))
-        for bits in COUNTING_BITS:
+        for bits in counting_bits:
             with precision(bits):
                 count = RealAxis(k).count(rational(point)) if point > last else None
                 if count is not None:
@@ -113,11 +115,14 @@ def _count_above(k: System, last: Fraction, above: float) -> tuple[int, str]:
 
 def _text(value: Fraction) -> str:
     """Return a positive number as an exact decimal string."""
-    with localcontext(prec=MOST_DECIMALS):
+    # of an exact decimal: more than any bracket has
+    most_decimals = 20_000
+    with localcontext(prec=most_decimals):
         return f"{Decimal(value.numerator) / value.denominator:f}"
 
 
-MOST_PIECES = 6000  # of one side of a contour, some 10 s of CPU time; the presets need up to 2,000
+# of one side of a contour, some 10 s of CPU time; the presets need up to 2,000
+MOST_PIECES = 6000
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,4 +247,6 @@ def _holds_one(k: System, law: Feedback | None, m: Ball, r: Ball) -> bool:
 def disjoint(discs: Sequence[Disc]) -> bool:
     """Whether no two discs touch."""
     parts = [(Fraction(d.re), Fraction(d.im), Fraction(d.radius)) for d in discs]
-    return all((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 > (a[2] + b[2]) ** 2 for a, b in combinations(parts, 2))
+    return all(
+        (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 > (a[2] + b[2]) ** 2 for a, b in combinations(parts, 2)
+    )

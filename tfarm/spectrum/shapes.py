@@ -52,10 +52,10 @@ from tfarm.records import read_only
 _rows = python_of(transition_rows)
 _series = python_of(transition_series)
 
-DOUBLE = 1e-15  # relative gap under which two frequencies are one, with two modes
-CLOSE_MODES = 1e-5  # relative gap under which rounding would leave two modes not quite orthogonal
-PANELS_AT_ONCE = 2**13  # times modes, each of 4 kB: memory alone
-NO_MOTION = 1e-9  # of another motion of the tip or hub: a smaller one is rounding
+# relative gap under which rounding would leave two modes not quite orthogonal
+CLOSE_MODES = 1e-5
+# times modes, each of 4 kB: memory alone
+PANELS_AT_ONCE = 2**13
 AT_HUB = Place(Fraction(0), "inner")
 AT_TIP = Place(Fraction(1))
 
@@ -68,21 +68,26 @@ class Shapes:
     """
 
     def __init__(self, system: System, omega: Real) -> None:
+        # relative gap under which two frequencies are one, with two modes
+        double = 1e-15
         self.system, self.omega = system, omega
         self._segments = list(reversed(system.segments))
         joints = list(accumulate((each.length for each in self._segments), initial=Fraction(0)))
-        self._ends = [(Place(low, "outer"), Place(min(high, Fraction(1)), "inner")) for low, high in pairwise(joints)]
+        self._ends = [
+            (Place(low, "outer"), Place(min(high, Fraction(1)), "inner")) for low, high in pairwise(joints)
+        ]
         edges = np.array([float(each) for each in joints])
         self._edges = edges / edges[-1]
         # Each mode is a sum of four responses, two of its own and two of a close neighbour below, for orthogonality:
         # frequency, condition on the axis (`_conditions`), scale and factor of each, the modes last.
         gap = np.r_[np.inf, np.diff(omega) / omega[1:], np.inf]
-        is_first = gap[1:] < DOUBLE
-        is_second = gap[:-1] < DOUBLE
+        is_first = gap[1:] < double
+        is_second = gap[:-1] < double
         close = np.minimum(gap[1:], gap[:-1]) < CLOSE_MODES
         conditions = self._conditions()
         left = np.array([self._at_axis(axis) for axis in conditions[:2]])
-        best = (abs(left[1]).max(axis=0) > abs(left[0]).max(axis=0)).astype(int)  # the larger one
+        # the larger one
+        best = (abs(left[1]).max(axis=0) > abs(left[0]).max(axis=0)).astype(int)
         Psi, M, Q = np.where(best, left[1], left[0])
         own = np.array([Q, -Psi if system.drive.turns else -M])
         own = np.where(is_first, [[1.0], [0.0]], np.where(is_second, [[0.0], [1.0]], own))
@@ -90,7 +95,8 @@ class Shapes:
         axes = [np.where(close, conditions[2], np.where(best, conditions[1], conditions[0])), conditions[3]]
         self._axes = np.array([*axes, *np.roll(axes, 1, axis=-1)])
         self._omegas = np.array([omega, omega, np.roll(omega, 1), np.roll(omega, 1)])
-        size = free_fields(system, 1j * omega, ())[2].real  # a cut system has other scales
+        # a cut system has other scales
+        size = free_fields(system, 1j * omega, ())[2].real
         self._sizes = np.array([size, size, np.roll(size, 1), np.roll(size, 1)])
         self._normalise()
 
@@ -120,7 +126,10 @@ class Shapes:
         while first < self.omega.size:
             # 4 modes; each next block has twice as many: time alone
             last = min(2 * first + 4, self.omega.size)
-            while last > first + 1 and (last - first) * sum(self.part(slice(first, last))._counts) > PANELS_AT_ONCE:
+            while (
+                last > first + 1
+                and (last - first) * sum(self.part(slice(first, last))._counts) > PANELS_AT_ONCE
+            ):
                 last = (first + last) // 2
             yield self.part(slice(first, last))
             first = last
@@ -182,7 +191,9 @@ class Shapes:
     def _counts(self) -> list[int]:
         """Numbers of panels of the segments, short against every wave of these modes."""
         S = self.omega.max() ** 2
-        waves = [(float(each.g) * S) ** 0.25 + math.sqrt(S * float(each.a + each.b)) for each in self._segments]
+        waves = [
+            (float(each.g) * S) ** 0.25 + math.sqrt(S * float(each.a + each.b)) for each in self._segments
+        ]
         # 4.0 rad of the fastest wave in a panel, integrated to the last digit
         # 2 of a segment with slow waves
         return [2 + math.ceil(each / 4.0) for each in waves]
@@ -204,12 +215,15 @@ class Shapes:
 
     def _responses(self, places: tuple[Place, ...]) -> Iterator[tuple[Whole, Real, Real, Real]]:
         """Yield each response: the modes that have it, its frequencies, states (4, modes, places) and hub angles."""
-        for omega, axes, size, factor in zip(self._omegas, self._axes, self._sizes, self._factors, strict=True):
+        for omega, axes, size, factor in zip(
+            self._omegas, self._axes, self._sizes, self._factors, strict=True
+        ):
             (modes,) = np.nonzero(factor)
             if modes.size:
                 states, theta, scale = free_fields(self.system, 1j * omega[modes], places, axes[:, modes])
                 unit = np.exp(scale - size[modes]) * factor[modes]
-                yield modes, omega[modes], (states * unit[:, None]).real, (theta * unit).real  # real on the axis
+                # real on the axis
+                yield modes, omega[modes], (states * unit[:, None]).real, (theta * unit).real
 
     def _along(self, number: int, x: Real) -> Real:
         """Return W, Psi, M, Q (4, modes, n) at the shares x, (n,) or (modes, n), of a segment."""
@@ -235,7 +249,9 @@ class Shapes:
             (system.tip_inertia, Psi),
             (system.drive.inertia, self.theta()),
         )
-        return parts + [(np.array([float(size)]), motion[None]) for size, motion in ends if math.isfinite(size)]
+        return parts + [
+            (np.array([float(size)]), motion[None]) for size, motion in ends if math.isfinite(size)
+        ]
 
     def _bodies(self) -> Iterator[tuple[Fraction, Body]]:
         """Yield the place and each body."""
@@ -248,6 +264,8 @@ class Shapes:
 
     def _normalise(self) -> None:
         """Scale to unit modal mass and a positive tip (else its rotation, else the hub), close modes orthogonal."""
+        # of another motion of the tip or hub: a smaller one is rounding
+        no_motion = 1e-9
         if not self.omega.size:
             return
         with np.errstate(all="ignore"):
@@ -262,8 +280,8 @@ class Shapes:
             self._factors[:, lower + 1] /= math.sqrt(self.part(slice(lower + 1, lower + 2)).masses()[0])
         tip = self.tip()
         theta = self.theta()
-        turned = np.where(abs(tip[1]) > NO_MOTION * abs(theta), tip[1], theta)
-        motion = np.where(abs(tip[0]) > NO_MOTION * abs(tip[1]), tip[0], turned)
+        turned = np.where(abs(tip[1]) > no_motion * abs(theta), tip[1], theta)
+        motion = np.where(abs(tip[0]) > no_motion * abs(tip[1]), tip[0], turned)
         self._factors = self._factors * np.where(motion < 0, -1.0, 1.0)
 
 
@@ -281,7 +299,9 @@ def _of_segment(segment: Segment, omega: Real, ends: Real, x: Real) -> Real:
         result[:, low] = _by_series(segment, omega[low], inner[:, low], x[low])
     if not low.all():
         fast = ~low
-        result[:, fast] = _by_waves(segment, omega[fast], numbers[..., fast], inner[:, fast], outer[:, fast], x[fast])
+        result[:, fast] = _by_waves(
+            segment, omega[fast], numbers[..., fast], inner[:, fast], outer[:, fast], x[fast]
+        )
     for end, state in ((0.0, inner), (1.0, outer)):
         mode, point = np.nonzero(x == end)
         result[:, mode, point] = state[:, mode]
@@ -309,7 +329,9 @@ def _by_waves(segment: Segment, omega: Real, numbers: Complex, inner: Real, oute
     fields = np.zeros((4, *x.shape))
     for n, other in ((0, 1), (1, 0)):
         gap = z[n] - z[other]
-        states = [((M - v[other] * W) / gap, (Psi - v[other] * Q / gS) / gap) for W, Psi, M, Q in (inner, outer)]
+        states = [
+            ((M - v[other] * W) / gap, (Psi - v[other] * Q / gS) / gap) for W, Psi, M, Q in (inner, outer)
+        ]
         wave, slope = _wave(z[n], k[n], states, x)
         fields += np.array([wave, v[n, :, None] * slope, v[n, :, None] * wave, gS[:, None] * slope])
     return fields
@@ -352,7 +374,8 @@ def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> 
     M = M + float(k.radius) * Q
     A = k.drive.at(at)[0][0]
     B = k.drive.at(at)[1][0]
-    if abs(A) > abs(B) > 0:  # the balance of a heavy hub, for the digits of M
+    # the balance of a heavy hub, for the digits of M
+    if abs(A) > abs(B) > 0:
         theta = M * B / A
     product = complex(slope * (theta / B if k.drive.turns else M))
     if product == 0 or not np.isfinite(product):
@@ -366,10 +389,12 @@ def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> 
     return np.asarray((-unit if (unit * tip).real < 0 else unit) * values[:-1], dtype=complex)
 
 
-Doubled = dict[str, Real]  # 2 d ln w/d ln p of each mode (modes,)
+# 2 d ln w/d ln p of each mode (modes,)
+Doubled = dict[str, Real]
 
 LINK = ("length", "density", "youngs_modulus", "shear_modulus", "shear_factor", "area", "second_moment")
-PARAMETERS = (*LINK, "hub_inertia", "payload_mass", "payload_inertia")  # of every arm; a rig has more
+# of every arm; a rig has more
+PARAMETERS = (*LINK, "hub_inertia", "payload_mass", "payload_inertia")
 
 
 def sensitivities(arm: Arm, shapes: Shapes) -> dict[str, Real]:
@@ -383,7 +408,8 @@ def sensitivities(arm: Arm, shapes: Shapes) -> dict[str, Real]:
 
 
 def _of_modes(arm: Arm, shapes: Shapes) -> Doubled:
-    ends = list(accumulate(Fraction(link.length) / shapes.system.length for link in arm.links))  # from the hub outwards
+    # from the hub outwards
+    ends = list(accumulate(Fraction(link.length) / shapes.system.length for link in arm.links))
     totals = [np.zeros((5, shapes.omega.size)) for _ in arm.links]
     start = Fraction(0)
     for piece, weight, fields in shapes.panels():
@@ -396,7 +422,9 @@ def _of_modes(arm: Arm, shapes: Shapes) -> Doubled:
     for number, each in enumerate(segments if len(segments) > 1 else (), start=1):
         found |= {f"segment_{number}_{name}": values for name, values in each.items()}
     for number in range(len(arm.attachments)):
-        found |= {f"attachment_{number + 1}_{name}": values for name, values in _attachment(arm, shapes, number)}
+        found |= {
+            f"attachment_{number + 1}_{name}": values for name, values in _attachment(arm, shapes, number)
+        }
     return found
 
 
@@ -418,7 +446,8 @@ def _densities(piece: Segment, omega: Any, W: Any, Psi: Any, M: Any, Q: Any) -> 
     length = float(piece.length)
     stiffness = float(piece.stiffness)
     square = omega**2
-    slip = float(piece.sigma) * length**2 / stiffness  # W' = Psi + slip Q
+    # W' = Psi + slip Q
+    slip = float(piece.sigma) * length**2 / stiffness
     bend = M**2 / stiffness / square
     shear = slip * Q**2 / square
     slide = Q * (Psi + slip * Q) / square
@@ -464,7 +493,8 @@ def _payload(arm: Arm, shapes: Shapes) -> Doubled:
     W, Psi, _, Q = shapes.tip()
     motions = (("mass", chain.tip_mass, W + float(chain.offset) * Psi), ("inertia", chain.tip_inertia, Psi))
     found = {
-        f"payload_{name}": -float(size if math.isfinite(size) else 0) * motion**2 for name, size, motion in motions
+        f"payload_{name}": -float(size if math.isfinite(size) else 0) * motion**2
+        for name, size, motion in motions
     }
     if arm.payload.offset:
         found["payload_offset"] = -2 * float(chain.offset) * Q * Psi / square

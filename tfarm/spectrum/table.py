@@ -30,12 +30,9 @@ from tfarm.exact.values import (
 )
 from tfarm.records import frozen
 from tfarm.schema import Column, Table, Tabled
-
-from .frequencies import ARMS_KEPT, count_below, natural_frequencies, refine
-from .proofs import Certificate, certify
-from .shapes import Shapes, sensitivities
-
-MOST_TABLE_MODES = 10_000  # of one table
+from tfarm.spectrum.frequencies import ARMS_KEPT, count_below, natural_frequencies, refine
+from tfarm.spectrum.proofs import Certificate, certify
+from tfarm.spectrum.shapes import Shapes, sensitivities
 
 
 @frozen
@@ -65,7 +62,9 @@ class Modes(Tabled):
         """A row a mode."""
         columns = (
             Column("index", "mode", of=self.index),
-            Column("omega", "natural frequency", "rad/s", of=self.natural_frequency, digits=singly(general, 12)),
+            Column(
+                "omega", "natural frequency", "rad/s", of=self.natural_frequency, digits=singly(general, 12)
+            ),
             Column("hertz", "frequency", "Hz", of=self.natural_frequency_hz, digits=singly(general, 9)),
         )
         return Table(columns=columns, title=f"modes of {self.arm.name}")
@@ -91,7 +90,8 @@ class Modes(Tabled):
         Under the Timoshenko theory each is also confirmed as a root of the paper's Delta(s), by mpmath.
         Raises ConvergenceError where a digit is not determined (a double frequency) or Delta has no root there.
         """
-        from tfarm.exact.appendix import roots_near  # here: mpmath takes a while to load
+        # here: mpmath takes a while to load
+        from tfarm.exact.appendix import roots_near
 
         digits = max(digits, 12)
         flexible = [refine(self._k, omega, digits) for omega in self.flexible.tolist()]
@@ -114,7 +114,8 @@ class Modes(Tabled):
             brackets = self.certify(20).brackets
             flexible = [float((Fraction(lower) + Fraction(upper)) / 2) for lower, upper in brackets]
         else:
-            from tfarm.exact.appendix import natural_frequency  # here: mpmath takes a while to load
+            # here: mpmath takes a while to load
+            from tfarm.exact.appendix import natural_frequency
 
             must_be_of_appendix(self.arm, self.theory)
             starts = self.flexible.tolist()
@@ -173,7 +174,9 @@ class Modes(Tabled):
         link = self.arm.link
         inertia = self.arm.hub_side_inertia
         if self.arm.reads_hub_moment and not self.arm.is_locked and inertia < link.rhoA * link.length**3 / 3:
-            return (self.arm.hub.stiffness - inertia * self.natural_frequency**2) * self.hub_participation + 0.0
+            return (
+                self.arm.hub.stiffness - inertia * self.natural_frequency**2
+            ) * self.hub_participation + 0.0
         return self.moment(0.0)
 
     @cached_property
@@ -252,25 +255,34 @@ class Modes(Tabled):
         return mode, x
 
 
-def modes(arm: Arm, count: int | None = None, *, up_to: float | None = None, theory: Theory | None = None) -> Modes:
+def modes(
+    arm: Arm, count: int | None = None, *, up_to: float | None = None, theory: Theory | None = None
+) -> Modes:
     """Return all undamped modes of the arm: the first `count` flexible ones, or those below `up_to` [rad/s].
 
     Complete by their count (Wittrick and Williams 1971), for any hub and payload, also above the shear cut-off, double
     frequencies twice.  `theory` is one of timoshenko, shear, rayleigh, euler-bernoulli.
     Raises ParameterError for a count outside 1..10000 or a frequency that is not positive.
     """
+    # of one table
+    most_table_modes = 10_000
     must_be_arm(arm)
     theory = arm.theory if theory is None else theory
     k = system_of(arm, theory).undamped
     rigid = arm.has_rigid_mode
-    require((count is None) != (up_to is None), "count", count, "give either a count of modes or a frequency up_to")
+    require(
+        (count is None) != (up_to is None),
+        "count",
+        count,
+        "give either a count of modes or a frequency up_to",
+    )
     if up_to is None:
-        count = whole("count", count, 1, math.inf, f"a whole number of modes from 1 to {MOST_TABLE_MODES}")
+        count = whole("count", count, 1, math.inf, f"a whole number of modes from 1 to {most_table_modes}")
     else:
         require(0 < up_to < math.inf, "up_to", up_to, "a positive, finite frequency in rad/s")
         count = modes_below(arm, up_to, theory=theory)
         require(count, "up_to", up_to, "no flexible mode lies below it; choose a higher one")
-    require(count <= MOST_TABLE_MODES, "count", count, f"at most {MOST_TABLE_MODES} modes")
+    require(count <= most_table_modes, "count", count, f"at most {most_table_modes} modes")
     flexible = natural_frequencies(k, rigid + 1, rigid + count)
     index = np.arange(1 - rigid, count + 1)
     return Modes(arm, theory, index, np.concatenate([[0.0] * rigid, flexible]), k)
@@ -283,7 +295,9 @@ def compare_theories(table: Modes) -> dict[Theory, Real]:
     numbers may have different shapes.
     """
     count = int(table.index.max())
-    by_theory = {theory: modes(table.arm, count, theory=theory) for theory in THEORIES if theory != table.theory}
+    by_theory = {
+        theory: modes(table.arm, count, theory=theory) for theory in THEORIES if theory != table.theory
+    }
     return {theory: by_theory.get(theory, table).natural_frequency for theory in THEORIES}
 
 

@@ -25,17 +25,20 @@ from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.gains import default_gains
 from tfarm.stopping import Progress
+from tfarm.studies.quantities import FREQUENCY, INTERVAL, STABILITY, intervals_of, prepare
+from tfarm.studies.space import Subjects
 from tfarm.tuner import LearningCurves, Tuning, compare_controllers, tried_loops, tune
 from tfarm.tuner.baselines import Outcomes, quantised_chain
 from tfarm.tuner.tuning import tune_by_default, usual_plan
 
-from .quantities import FREQUENCY, INTERVAL, STABILITY, intervals_of, prepare
-from .space import Subjects
-
-STUDIED_MODES = 4  # flexible modes, by default
-DEPTHS = (0.002, 0.003, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.040, 0.060)  # m, for that area
-INERTIAS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # kg m^2, about the value assumed for the paper's hub
-OWN_VALUE = 1e-9  # relative: a candidate nearer to the arm's own value is that value
+# flexible modes, by default
+STUDIED_MODES = 4
+# m, for that area
+DEPTHS = (0.002, 0.003, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.040, 0.060)
+# kg m^2, about the value assumed for the paper's hub
+INERTIAS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+# relative: a candidate nearer to the arm's own value is that value
+OWN_VALUE = 1e-9
 
 
 # ------------------------------------------------------------ sections and hubs
@@ -49,25 +52,42 @@ class Candidate:
     """
 
     is_own: Annotated[bool, Quantity("this arm", help="whether the row is the arm's own value")]
-    depth: Annotated[float | None, Quantity("depth", "m", 4, "of the candidate rectangle, in the plane of bending")] = (
-        None
-    )
+    depth: Annotated[
+        float | None, Quantity("depth", "m", 4, "of the candidate rectangle, in the plane of bending")
+    ] = None
     width: Annotated[
-        float | None, Quantity("width", "m", 4, "of the candidate rectangle: the arm's own area over the depth")
+        float | None,
+        Quantity("width", "m", 4, "of the candidate rectangle: the arm's own area over the depth"),
     ] = None
     second_moment: Annotated[
         float | None,
-        Quantity("I", "m^4", 4, key="second_moment_m4", help="second moment of area about the neutral axis of bending"),
+        Quantity(
+            "I",
+            "m^4",
+            4,
+            key="second_moment_m4",
+            help="second moment of area about the neutral axis of bending",
+        ),
     ] = None
     hub_inertia: Annotated[
         float | None,
-        Quantity("I_h", "kg m^2", 4, key="hub_inertia_kg_m2", help="candidate inertia of hub and rotor about the axis"),
+        Quantity(
+            "I_h",
+            "kg m^2",
+            4,
+            key="hub_inertia_kg_m2",
+            help="candidate inertia of hub and rotor about the axis",
+        ),
     ] = None
     natural_frequency: Annotated[
         list[float],
-        Quantity("natural frequencies", "rad/s", help="flexible modes of the candidate from the first, undamped"),
+        Quantity(
+            "natural frequencies", "rad/s", help="flexible modes of the candidate from the first, undamped"
+        ),
     ]
-    sensitivity: Annotated[list[float], Quantity("sensitivities", "%/%", 4, "of frequency to I or I_h, exact")]
+    sensitivity: Annotated[
+        list[float], Quantity("sensitivities", "%/%", 4, "of frequency to I or I_h, exact")
+    ]
     verdict: Annotated[
         str,
         Quantity(
@@ -77,7 +97,9 @@ class Candidate:
             "stability of the loop with the default gains of the arm itself; no loop where the hub has no inertia",
         ),
     ] = "no loop"
-    K2_below: Annotated[float | None, Quantity(f"stable below {MOMENT_GAIN}", help="of the default loop")] = None
+    K2_below: Annotated[float | None, Quantity(f"stable below {MOMENT_GAIN}", help="of the default loop")] = (
+        None
+    )
     K2_below_is_edge: Annotated[
         bool,
         Quantity(
@@ -94,7 +116,9 @@ class Candidates:
     """Candidates of one assumed parameter, and the limits of every frequency where it is the hub's inertia."""
 
     arm: Arm
-    held: Annotated[str, Quantity("sensitivity", help="what is kept constant where a frequency is differentiated")]
+    held: Annotated[
+        str, Quantity("sensitivity", help="what is kept constant where a frequency is differentiated")
+    ]
     locked: Annotated[
         Real,
         Quantity(
@@ -108,15 +132,25 @@ class Candidates:
     pinned: Annotated[
         Real,
         Quantity(
-            "free pin (I_h = 0) [rad/s]", "", 6, "limits of the frequencies for a hub without inertia", "pinned_rad_s"
+            "free pin (I_h = 0) [rad/s]",
+            "",
+            6,
+            "limits of the frequencies for a hub without inertia",
+            "pinned_rad_s",
         ),
     ]
     area: Annotated[
-        float, Quantity("area", "m^2", key="area_m2", help="cross-section of the link, the same for every candidate")
+        float,
+        Quantity(
+            "area", "m^2", key="area_m2", help="cross-section of the link, the same for every candidate"
+        ),
     ]
-    shear_factor: Annotated[float, Quantity("shear factor", help="of the arm's own section, kept for every candidate")]
+    shear_factor: Annotated[
+        float, Quantity("shear factor", help="of the arm's own section, kept for every candidate")
+    ]
     candidates: Annotated[
-        list[Candidate], Quantity("candidates", help="frequencies, sensitivities and stability, a row a candidate")
+        list[Candidate],
+        Quantity("candidates", help="frequencies, sensitivities and stability, a row a candidate"),
     ]
 
 
@@ -127,10 +161,13 @@ class Assumptions:
     arm: Annotated[str, Quantity("arm", help="arm whose section and hub inertia are varied")]
     count: Annotated[int, Quantity("flexible modes", help="number of flexible modes in each row")]
     gains: Annotated[
-        dict[str, float], Quantity("gains of the loop", help="default gains of the arm, the same for every candidate")
+        dict[str, float],
+        Quantity("gains of the loop", help="default gains of the arm, the same for every candidate"),
     ]
     section: Annotated[Candidates, Quantity("section", help="rectangles of the arm's own area")]
-    hub: Annotated[Candidates | None, Quantity("hub", help="hub inertias; none where the hub is locked or a free pin")]
+    hub: Annotated[
+        Candidates | None, Quantity("hub", help="hub inertias; none where the hub is locked or a free pin")
+    ]
 
 
 def assumptions(arm: Arm, count: int) -> Assumptions:
@@ -164,10 +201,14 @@ def section_study(arm: Arm, count: int = STUDIED_MODES) -> Candidates:
     own = math.sqrt(12.0) * arm.link.section.radius_of_gyration
     # the paper's area [m^2]
     depths = _with_own([float(f"{each * math.sqrt(area / 6.0e-4):.2g}") for each in DEPTHS], own)
-    known = {"depth": depths, "width": [area / depth for depth in depths],
-             "second_moment": [area * depth**2 / 12 for depth in depths]}  # fmt: skip
+    known = {
+        "depth": depths,
+        "width": [area / depth for depth in depths],
+        "second_moment": [area * depth**2 / 12 for depth in depths],
+    }
     plain = Section.general(area=area, second_moment=area * own**2 / 12, shear_factor=arm.link.shear_factor)
-    general = replace(arm, link=replace(arm.link, section=plain))  # whose file has a second moment
+    # whose file has a second moment
+    general = replace(arm, link=replace(arm.link, section=plain))
     rows = _candidates(general, count, "link.section.second_moment", depths.index(own), known)
     return Candidates(
         arm,
@@ -193,12 +234,17 @@ def hub_study(arm: Arm, count: int = STUDIED_MODES) -> Candidates:
     pinned, locked = (
         modes(arm.having(hub_inertia=limit), count).natural_frequency[-count:] for limit in (0.0, math.inf)
     )
-    if not arm.having(hub_inertia=1.0).has_rigid_mode:  # the first falls to 0, a heavy hub on the arm's own stiffness
+    # the first falls to 0, a heavy hub on the arm's own stiffness
+    if not arm.having(hub_inertia=1.0).has_rigid_mode:
         locked = np.r_[0.0, locked[:-1]]
-    return Candidates(arm, "all else held", locked, pinned, arm.link.section.area, arm.link.shear_factor, rows)
+    return Candidates(
+        arm, "all else held", locked, pinned, arm.link.section.area, arm.link.shear_factor, rows
+    )
 
 
-def _candidates(arm: Arm, count: int, key: str, own: int, known: Mapping[str, Sequence[Any]]) -> list[Candidate]:
+def _candidates(
+    arm: Arm, count: int, key: str, own: int, known: Mapping[str, Sequence[Any]]
+) -> list[Candidate]:
     """Return the rows of a study of that key, whose values are the last of those known; `own` is the arm's own row."""
     parameter, values = list(known.items())[-1]
     limit = f"{INTERVAL}.{MOMENT_GAIN}.high"
@@ -214,11 +260,15 @@ def _candidates(arm: Arm, count: int, key: str, own: int, known: Mapping[str, Se
             found = intervals_of(one, {limit})
             is_edge = found.get(f"{limit}_is") == "edge"
             loop = {"verdict": found[STABILITY], "K2_below": found.get(limit), "K2_below_is_edge": is_edge}
-        rows.append(Candidate(
-            is_own=n == own, natural_frequency=table.natural_frequency[-count:].tolist(),
-            sensitivity=(table.sensitivity[parameter][-count:] + 0.0).tolist(), **loop,
-            **{name: column[n] for name, column in known.items()},
-        ))  # fmt: skip
+        rows.append(
+            Candidate(
+                is_own=n == own,
+                natural_frequency=table.natural_frequency[-count:].tolist(),
+                sensitivity=(table.sensitivity[parameter][-count:] + 0.0).tolist(),
+                **loop,
+                **{name: column[n] for name, column in known.items()},
+            )
+        )
     return rows
 
 
@@ -261,8 +311,10 @@ def learning_curves(
 
 
 WITHOUT = f"without moment feedback, {MOMENT_GAIN} = 0"
-CURVE_SAMPLES = 80_000_000  # that the trials of learning curves may have together, some 35 s of one core
-LONG_TRIAL = 16_000  # samples: the comparison of a longer one is of the arm itself alone
+# that the trials of learning curves may have together, some 35 s of one core
+CURVE_SAMPLES = 80_000_000
+# samples: the comparison of a longer one is of the arm itself alone
+LONG_TRIAL = 16_000
 
 
 @frozen

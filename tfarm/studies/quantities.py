@@ -18,7 +18,9 @@ from functools import cache
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
-import scipy  # whose statistics take half a second to load
+
+# whose statistics take half a second to load
+import scipy
 
 from tfarm.arm import PLANE
 from tfarm.arrays import Real
@@ -38,15 +40,17 @@ from tfarm.schema import Percent, Quantity, quantities
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.frequencies import list_frequencies
 from tfarm.spectrum.shapes import PARAMETERS
+from tfarm.studies.space import Subject, Subjects
 from tfarm.tuner.tuning import tune_by_default
 
-from .space import Subject, Subjects
-
-FAILED = "failed"  # column of the reason of a missing result
-LISTED = 5  # modes and poles of a row
+# column of the reason of a missing result
+FAILED = "failed"
+# modes and poles of a row
+LISTED = 5
 NO_PARENT = Quantity()
 LOOPS = ("continuous", "sampled")
-CARD = "card"  # the result card of both loops
+# the result card of both loops
+CARD = "card"
 FREQUENCY = "modes.natural_frequency_rad_s"
 RATIO = "damped_modes.damping_ratio"
 SENSITIVITY = "sensitivity"
@@ -61,8 +65,10 @@ IMAGINARY = "poles.im_rad_s"
 CONFIDENCE = 0.95
 QUANTILES = {"least": 0.0, "low": 0.05, "median": 0.5, "high": 0.95, "largest": 1.0}
 STABLE = "stable"
-Values = Callable[[Subject, Set[str]], Mapping[str, Any]]  # of an arm, in these columns
-ColumnSource = tuple[Mapping[str, Quantity], Values]  # columns, and their values
+# of an arm, in these columns
+Values = Callable[[Subject, Set[str]], Mapping[str, Any]]
+# columns, and their values
+ColumnSource = tuple[Mapping[str, Quantity], Values]
 
 
 def first_of(name: str) -> str:
@@ -91,7 +97,9 @@ def _most(names: Set[str]) -> int:
     return max(int(name.rpartition(".")[2]) for name in names)
 
 
-def entries_of(kind: Any, value: Any, under: str, parent: Quantity = NO_PARENT) -> Iterator[tuple[str, Quantity, Any]]:
+def entries_of(
+    kind: Any, value: Any, under: str, parent: Quantity = NO_PARENT
+) -> Iterator[tuple[str, Quantity, Any]]:
     """Yield dotted name, quantity and value of each entry of a record of that class; no value where that is None.
 
     The first entry without a label (the value of a graded margin) has the name and the quantity of its parent.
@@ -109,14 +117,20 @@ def entries_of(kind: Any, value: Any, under: str, parent: Quantity = NO_PARENT) 
             yield from entries_of(inner, own, place, column)
         else:
             is_text = bool({str, tuple} & {*kinds})
-            yield place, replace(column, is_number=not is_text), "; ".join(own) if isinstance(own, tuple) else own
+            yield (
+                place,
+                replace(column, is_number=not is_text),
+                "; ".join(own) if isinstance(own, tuple) else own,
+            )
 
 
 @cache
 def _kinds(kind: Any) -> dict[str, tuple[Any, ...]]:
     """Return the classes of which each field of a record may be."""
     return {
-        name: tuple(each for part in (hint, *get_args(hint)) if isinstance(each := get_origin(part) or part, type))
+        name: tuple(
+            each for part in (hint, *get_args(hint)) if isinstance(each := get_origin(part) or part, type)
+        )
         for name, hint in get_type_hints(kind).items()
     }
 
@@ -138,8 +152,11 @@ def _card_of(loop: str) -> ColumnSource:
 
 def _step_of(one: Subject, _: Set[str]) -> dict[str, Any]:
     found = step(one.case.arm, one.case.law, one.case.chain, "slew")
-    return {name: value for loop in LOOPS
-            for name, _, value in entries_of(LoopResponse, getattr(found, loop), f"step.{loop}")}  # fmt: skip
+    return {
+        name: value
+        for loop in LOOPS
+        for name, _, value in entries_of(LoopResponse, getattr(found, loop), f"step.{loop}")
+    }
 
 
 def _modes_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
@@ -162,8 +179,11 @@ def prepare(subjects: Sequence[Subject], names: Sequence[str]) -> None:
 
 def _sensitivities_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
     count = _most(names)
-    return {name: value for parameter, values in modes(one.case.arm, count).sensitivity.items()
-            for name, value in _numbered(f"{SENSITIVITY}.{parameter}", values[-count:] + 0.0).items()}  # fmt: skip
+    return {
+        name: value
+        for parameter, values in modes(one.case.arm, count).sensitivity.items()
+        for name, value in _numbered(f"{SENSITIVITY}.{parameter}", values[-count:] + 0.0).items()
+    }
 
 
 def intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
@@ -171,9 +191,15 @@ def intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
     found: dict[str, Any] = {STABILITY: "undecided"}
     with suppress(ConvergenceError):
         verdict = stability(admit_case(SAMPLED_LOOP, one.case))
-        gains = [gain for gain in PLANE if gain in verdict.loop.numbers and any(f".{gain}." in name for name in names)]
+        gains = [
+            gain
+            for gain in PLANE
+            if gain in verdict.loop.numbers and any(f".{gain}." in name for name in names)
+        ]
         for gain, of in windows_of(verdict, gains).items():
-            found |= {f"{INTERVAL}.{gain}.{name}": getattr(of.interval, name, None) for name in Interval._fields}
+            found |= {
+                f"{INTERVAL}.{gain}.{name}": getattr(of.interval, name, None) for name in Interval._fields
+            }
         found[STABILITY] = verdict.word
     return found
 
@@ -193,12 +219,18 @@ def _poles_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
 
 def _numbered(name: str, values: Any) -> dict[str, float | None]:
     """Return values under numbered names, None where there are none."""
-    return {f"{name}.{n}": each if math.isfinite(each) else None for n, each in enumerate(values.tolist(), start=1)}
+    return {
+        f"{name}.{n}": each if math.isfinite(each) else None
+        for n, each in enumerate(values.tolist(), start=1)
+    }
 
 
 def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Quantity]:
     """Return the numbered columns of a quantity of modes or poles."""
-    return {f"{name}.{n}": Quantity(f"{label} {n}", unit, help=meaning, is_number=True) for n in range(1, LISTED + 1)}
+    return {
+        f"{name}.{n}": Quantity(f"{label} {n}", unit, help=meaning, is_number=True)
+        for n in range(1, LISTED + 1)
+    }
 
 
 def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
@@ -217,31 +249,65 @@ def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
 ASKED: tuple[ColumnSource, ...] = (
     *map(_card_of, LOOPS),
     (_columns(FREQUENCY, "natural frequency, mode", "rad/s", "of the undamped arm"), _modes_of),
-    ({name: column for parameter in PARAMETERS for name, column in _columns(
-        f"{SENSITIVITY}.{parameter}", f"sensitivity to {parameter}, mode", "%/%", "d ln(natural frequency)/d ln(number)"
-    ).items()}, _sensitivities_of),
-    ({
-        STABILITY: Quantity("stability", help="of the continuous-time loop"),
-        **{f"{INTERVAL}.{gain}.{name}": replace(of, label=f"stability interval of {gain} {of.label}")
-           for gain in PLANE for name, of in quantities(Interval).items()},
-    }, intervals_of),
+    (
+        {
+            name: column
+            for parameter in PARAMETERS
+            for name, column in _columns(
+                f"{SENSITIVITY}.{parameter}",
+                f"sensitivity to {parameter}, mode",
+                "%/%",
+                "d ln(natural frequency)/d ln(number)",
+            ).items()
+        },
+        _sensitivities_of,
+    ),
+    (
+        {
+            STABILITY: Quantity("stability", help="of the continuous-time loop"),
+            **{
+                f"{INTERVAL}.{gain}.{name}": replace(of, label=f"stability interval of {gain} {of.label}")
+                for gain in PLANE
+                for name, of in quantities(Interval).items()
+            },
+        },
+        intervals_of,
+    ),
     (_columns(RATIO, "damping ratio, mode", "", "of the arm without controller"), _damped_of),
-    ({
-        UNSTABLE: Quantity("unstable poles", help="conjugates counted", is_number=True),
-        **_columns(REAL, "real part, pole", "1/s", "of the continuous-time loop, ascending in frequency"),
-        **_columns(IMAGINARY, "imaginary part, pole", "rad/s", "of the continuous-time loop, ascending"),
-    }, _poles_of),
-    ({name: column for loop in LOOPS
-           for name, column, _ in entries_of(LoopResponse, None, f"step.{loop}")}, _step_of),
-    ({
-        "tuner.cost": Quantity("cost of the tuned slew", help="none where training diverged", is_number=True),
-        "tuner.cost_best_constant": Quantity("cost with the best constant gain", help="same slew", is_number=True),
-        "tuner.trials": Quantity("trials", help="slews of the training", is_number=True),
-        "tuner.is_zero": Quantity("zero gain", help="1 where the moment gain went to zero, else 0", is_number=True),
-        f"{TRIAL_COST}.1": Quantity("cost of trial 1", help="none after a divergence", is_number=True),
-        "tuner.stopped": Quantity("stopped", help="trial and sample of a divergence"),
-    }, _tuner_of),
-)  # fmt: skip
+    (
+        {
+            UNSTABLE: Quantity("unstable poles", help="conjugates counted", is_number=True),
+            **_columns(REAL, "real part, pole", "1/s", "of the continuous-time loop, ascending in frequency"),
+            **_columns(IMAGINARY, "imaginary part, pole", "rad/s", "of the continuous-time loop, ascending"),
+        },
+        _poles_of,
+    ),
+    (
+        {
+            name: column
+            for loop in LOOPS
+            for name, column, _ in entries_of(LoopResponse, None, f"step.{loop}")
+        },
+        _step_of,
+    ),
+    (
+        {
+            "tuner.cost": Quantity(
+                "cost of the tuned slew", help="none where training diverged", is_number=True
+            ),
+            "tuner.cost_best_constant": Quantity(
+                "cost with the best constant gain", help="same slew", is_number=True
+            ),
+            "tuner.trials": Quantity("trials", help="slews of the training", is_number=True),
+            "tuner.is_zero": Quantity(
+                "zero gain", help="1 where the moment gain went to zero, else 0", is_number=True
+            ),
+            f"{TRIAL_COST}.1": Quantity("cost of trial 1", help="none after a divergence", is_number=True),
+            "tuner.stopped": Quantity("stopped", help="trial and sample of a divergence"),
+        },
+        _tuner_of,
+    ),
+)
 COLUMNS = {name: column for columns, _ in ASKED for name, column in columns.items()}
 
 
@@ -313,18 +379,25 @@ class StableShare(NamedTuple):
     other: Annotated[int, Quantity(key="not_stable", help="arms with a marginal or unstable loop")]
     open: Annotated[int, Quantity(key="not_determined", help="arms without a result")]
     certainty: Annotated[str, Quantity(help="weakest word of certainty among the stable arms")]
-    at_least: Annotated[Percent | None, Quantity(
-            help="least share of stable arms, with 95 % confidence; of independent draws only")]  # fmt: skip
+    at_least: Annotated[
+        Percent | None,
+        Quantity(help="least share of stable arms, with 95 % confidence; of independent draws only"),
+    ]
 
     @property
-    def finding(self) -> Annotated[str, Quantity("finding", help="stable arms, with their confidence in per cent")]:
+    def finding(
+        self,
+    ) -> Annotated[str, Quantity("finding", help="stable arms, with their confidence in per cent")]:
         """Stable arms with certainty and confidence."""
         text = f"{self.certainty} stable on {self.stable:,} of {self.stable + self.other + self.open:,} arms".strip()
-        others = [f"{self.other:,} not stable"] * bool(self.other) + [f"{self.open:,} not determined"] * bool(self.open)
+        others = [f"{self.other:,} not stable"] * bool(self.other) + [f"{self.open:,} not determined"] * bool(
+            self.open
+        )
         text += f" ({', '.join(others)})" * bool(others)
         if self.at_least is None:
             return text
-        percent = math.floor(1e4 * self.at_least + 1e-6) / 100  # never more than was shown
+        # never more than was shown
+        percent = math.floor(1e4 * self.at_least + 1e-6) / 100
         return f"{text}: at least {percent:g} % of all with {100 * CONFIDENCE:g} % confidence"
 
 
@@ -341,7 +414,9 @@ class Spread(NamedTuple):
     high: Annotated[float, Quantity("95 %", "", 4, key="quantile_95", help="quantile 0.95")]
     largest: Annotated[float, Quantity("largest", "", 4, help="largest value")]
     driver: Annotated[str | None, Quantity("driver", help="varied number with the largest rank correlation")]
-    correlation: Annotated[float | None, Quantity("rank correlation", "", 2, help="Spearman's, of that number")]
+    correlation: Annotated[
+        float | None, Quantity("rank correlation", "", 2, help="Spearman's, of that number")
+    ]
 
 
 class Failure(NamedTuple):
@@ -358,7 +433,9 @@ def least_share(successes: int, count: int) -> float:
     return float(test.proportion_ci(CONFIDENCE, method="exact").low)
 
 
-def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bool) -> tuple[StableShare, ...]:
+def shares_of(
+    table: Mapping[str, Any], names: Sequence[str], is_independent: bool
+) -> tuple[StableShare, ...]:
     """Return the stable shares of the loops whose stability was computed."""
     found = []
     for loop in [each for each in LOOPS if f"{each}.stability" in names]:
@@ -366,7 +443,11 @@ def shares_of(table: Mapping[str, Any], names: Sequence[str], is_independent: bo
         stable = words.count(STABLE)
         undetermined = words.count("")
         texts = table.get(f"{loop}.certainty", [""] * len(words))
-        known = [text.partition(" ")[0].rstrip(",") for text, word in zip(texts, words, strict=True) if word == STABLE]
+        known = [
+            text.partition(" ")[0].rstrip(",")
+            for text, word in zip(texts, words, strict=True)
+            if word == STABLE
+        ]
         weakest = ["exact", "certified", "converged", "approximate", "not determined", ""]
         share = StableShare(
             loop=loop.replace("continuous", "continuous-time"),
@@ -389,15 +470,27 @@ def spreads_of(table: Mapping[str, Any], names: Sequence[str], keys: Sequence[st
             driver, correlation = _driver({key: table[key][is_known] for key in keys}, values)
             ends = dict(zip(QUANTILES, np.quantile(values, list(QUANTILES.values())).tolist(), strict=True))
             label = ", ".join(filter(None, (loop_of(name), of.label)))
-            found.append(Spread(name=name, label=label, unit=of.unit, arms=values.size, driver=driver,
-                                correlation=correlation, **ends))  # fmt: skip
+            found.append(
+                Spread(
+                    name=name,
+                    label=label,
+                    unit=of.unit,
+                    arms=values.size,
+                    driver=driver,
+                    correlation=correlation,
+                    **ends,
+                )
+            )
     return tuple(found)
 
 
 def _driver(inputs: Mapping[str, Real], values: Real) -> tuple[str | None, float | None]:
     """Return the varied number of the largest significant rank correlation, and that."""
-    known = {key: scipy.stats.spearmanr(column, values) for key, column in inputs.items()
-             if len(values) >= 10 and np.ptp(column) > 0 and np.ptp(values) > 0}  # fmt: skip
+    known = {
+        key: scipy.stats.spearmanr(column, values)
+        for key, column in inputs.items()
+        if len(values) >= 10 and np.ptp(column) > 0 and np.ptp(values) > 0
+    }
     # Bonferroni: of several numbers one is often near it by chance
     level = 0.05 / max(1, len(inputs))
     found = {key: float(of.statistic) for key, of in known.items() if of.pvalue < level}

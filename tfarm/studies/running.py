@@ -29,18 +29,22 @@ from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line,
 from tfarm.files import write_file
 from tfarm.records import frozen
 from tfarm.stopping import Progress
+from tfarm.studies.quantities import FAILED, Values, prepare, quantity_of, sources_of, values_of
+from tfarm.studies.space import Space, Subject, Subjects, extra, parquet
 
-from .quantities import FAILED, Values, prepare, quantity_of, sources_of, values_of
-from .space import Space, Subject, Subjects, extra, parquet
-
-Chunk = dict[str, list[Any]]  # columns of a range of rows
-Row = dict[str, Any]  # the columns of one
-ChunkTask = tuple[int, Callable[[], Chunk]]  # number of a part, and the call that returns its table
-Engine = Callable[[Iterator[ChunkTask]], Iterator[tuple[int, Chunk]]]  # yields each task with its table as it comes
+# columns of a range of rows
+Chunk = dict[str, list[Any]]
+# the columns of one
+Row = dict[str, Any]
+# number of a part, and the call that returns its table
+ChunkTask = tuple[int, Callable[[], Chunk]]
+# yields each task with its table as it comes
+Engine = Callable[[Iterator[ChunkTask]], Iterator[tuple[int, Chunk]]]
 # keys of errors
 OUT = "--out"
 SCHEDULER = "--scheduler"
-ROW = "row"  # column of the number of the row, from 0
+# column of the number of the row, from 0
+ROW = "row"
 FILE = "study.json"
 PARQUET = ".parquet"
 STUDY_FILE = "study.toml"
@@ -50,10 +54,12 @@ CHECKED = 1000
 # of a chunk
 LEAST_SECONDS = 5.0
 MOST_SECONDS = 30.0
-CHUNKS_A_WORKER = 10  # where that leaves them within these
-BATCH = 32  # arms whose frequencies are found together; the exact numbers of twice as many are kept
-PATIENCE = 20  # seconds for a scheduler to answer, and for its first worker
-PACKAGES = ("tfarm", "numpy", "scipy", "numba")  # versions that all workers have in common
+# where that leaves them within these
+CHUNKS_A_WORKER = 10
+# arms whose frequencies are found together; the exact numbers of twice as many are kept
+BATCH = 32
+# seconds for a scheduler to answer, and for its first worker
+PATIENCE = 20
 
 
 @frozen
@@ -126,7 +132,8 @@ def _attempt(function: Callable[..., Any], *arguments: Any) -> Any:
 
 def seconds_an_arm(plan: StudyPlan, rows: Real) -> float:
     """Return the mean time of the first rows of values (rows, keys) [s]."""
-    table_of(plan, 0, rows[:1])  # which compiles
+    # which compiles
+    table_of(plan, 0, rows[:1])
     pilot = rows[-PILOT:]
     began = time.perf_counter()
     table_of(plan, 0, pilot)
@@ -147,9 +154,11 @@ class StudyFolder:
     folder: Path
     plan: StudyPlan
     digest: str
-    rows: int  # of a part
+    # of a part
+    rows: int
     suffix: str
-    size: int  # rows of all parts
+    # rows of all parts
+    size: int
     prefix: str = "part-"
 
     @property
@@ -160,7 +169,11 @@ class StudyFolder:
     def others(self, prefix: str, size: int, rows: int, names: Sequence[str]) -> "StudyFolder":
         """Return parts of that many other rows with these columns, in the same folder; at most `rows` in one."""
         return replace(
-            self, plan=replace(self.plan, names=tuple(names)), prefix=prefix, size=size, rows=min(self.rows, rows)
+            self,
+            plan=replace(self.plan, names=tuple(names)),
+            prefix=prefix,
+            size=size,
+            rows=min(self.rows, rows),
         )
 
     @property
@@ -177,7 +190,12 @@ class StudyFolder:
         names = {each.name for each in self.folder.glob(f"{self.prefix}*")}
         found = [number for number in range(self.count) if self.path(number).name in names]
         strange = sorted(names - {self.path(number).name for number in found})
-        require(not strange, OUT, str(self.folder), f"{strange[:1]} is a part of another study: choose another folder")
+        require(
+            not strange,
+            OUT,
+            str(self.folder),
+            f"{strange[:1]} is a part of another study: choose another folder",
+        )
         return found
 
     def write(self, number: int, table: Mapping[str, Sequence[Any]]) -> None:
@@ -187,11 +205,15 @@ class StudyFolder:
             arrow = importlib.import_module("pyarrow")
             binary = io.BytesIO()
             kinds = {name: arrow.string() if name in self.plan.texts else arrow.float64() for name in table}
-            module.write_table(arrow.table({name: arrow.array(of, kinds[name]) for name, of in table.items()}), binary)
+            module.write_table(
+                arrow.table({name: arrow.array(of, kinds[name]) for name, of in table.items()}), binary
+            )
             content = binary.getvalue()
         else:
             stream = io.StringIO()
-            csv.writer(stream, lineterminator="\n").writerows([tuple(table), *zip(*table.values(), strict=True)])
+            csv.writer(stream, lineterminator="\n").writerows(
+                [tuple(table), *zip(*table.values(), strict=True)]
+            )
             content = stream.getvalue().encode()
         write_file(self.path(number), content, key=OUT)
 
@@ -233,12 +255,24 @@ def open_study(
     space = plan.space
     file = folder / FILE
     suffix = PARQUET if importlib.util.find_spec("pyarrow") else ".csv"
-    hashes = {name: hashlib.sha256(content).hexdigest() for name, content in files.items() if name != STUDY_FILE}
-    inputs = json.loads(json.dumps({
-        "over": list(space.over.items()), "columns": plan.names, "draws": space.draws, "seed": space.seed,
-        "list": space.listing and _sha256(space.listing.path), "parts": suffix, "versions": versions(),
-        "posterior": space.posterior and space.posterior.model_dump(), **hashes,
-    }))  # fmt: skip
+    hashes = {
+        name: hashlib.sha256(content).hexdigest() for name, content in files.items() if name != STUDY_FILE
+    }
+    inputs = json.loads(
+        json.dumps(
+            {
+                "over": list(space.over.items()),
+                "columns": plan.names,
+                "draws": space.draws,
+                "seed": space.seed,
+                "list": space.listing and _sha256(space.listing.path),
+                "parts": suffix,
+                "versions": versions(),
+                "posterior": space.posterior and space.posterior.model_dump(),
+                **hashes,
+            }
+        )
+    )
     if file.exists():
         known = validated_file(
             StudyRecord, file, 1 << 20, key=OUT, what=f"a {FILE} of tfarm study; choose another folder"
@@ -255,7 +289,8 @@ def open_study(
         count = size or rows_a_chunk(seconds_an_arm(plan, rows[:PILOT]), space.count, workers)
     digest = hashlib.sha256(json.dumps([inputs, count]).encode()).hexdigest()
     parts = StudyFolder(folder, plan, digest, count, suffix, space.count)
-    parts.written()  # is refused before a file is written
+    # is refused before a file is written
+    parts.written()
     text = StudyRecord(inputs=inputs, rows_a_part=count).model_dump_json(indent=1)
     for name, content in {**files, FILE: f"{text}\n".encode()}.items() if not file.exists() else ():
         write_file(folder / name, content, key=OUT)
@@ -269,7 +304,9 @@ def _sha256(path: Path) -> str:
 
 def versions() -> dict[str, str]:
     """Return the versions of the packages on which numbers depend."""
-    return {name: importlib.import_module(name).__version__ for name in PACKAGES}
+    # versions that all workers have in common
+    packages = ("tfarm", "numpy", "scipy", "numba")
+    return {name: importlib.import_module(name).__version__ for name in packages}
 
 
 # ------------------------------------------------------------------------------------------------------------ runs
@@ -378,7 +415,8 @@ def cluster(scheduler: str) -> Any:
     Certificates of a tls:// address are those of Dask's own configuration (distributed.comm.tls).
     """
     distributed = extra("distributed", "cluster", SCHEDULER, scheduler)
-    for name in ("distributed", "distributed.client"):  # whose errors come as one line of ours
+    # whose errors come as one line of ours
+    for name in ("distributed", "distributed.client"):
         getLogger(name).setLevel("CRITICAL")
     try:
         client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
@@ -411,12 +449,18 @@ def on_cluster(tasks: Iterator[ChunkTask], client: Any) -> Iterator[tuple[int, C
             future = next(queue)
             theirs, table = future.result()
             require(
-                theirs == versions(), "versions of a worker", theirs, f"install those of this machine: {versions()}"
+                theirs == versions(),
+                "versions of a worker",
+                theirs,
+                f"install those of this machine: {versions()}",
             )
             yield running.pop(future.key), table
-    except Exception as error:  # a chunk itself raises none
+    except Exception as error:
+        # a chunk itself raises none
         raise ConvergenceError(
-            f"the cluster failed ({type(error).__name__}: {one_line(str(error), 200)}); run the study again", None, None
+            f"the cluster failed ({type(error).__name__}: {one_line(str(error), 200)}); run the study again",
+            None,
+            None,
         ) from None
 
 

@@ -19,7 +19,9 @@ from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 import numpy as np
-import scipy  # whose statistics take half a second to load, and do so where they are used
+
+# whose statistics take half a second to load, and do so where they are used
+import scipy
 
 from tfarm.arm.chain import CHAIN_TABLES
 from tfarm.arm.checks import number
@@ -37,11 +39,12 @@ from tfarm.tuner import tuning
 # prefixes of the numbers of the controller and of the tuner
 LAW = "law."
 TUNER = "tuner."
-MOST_ROWS = 10_000_000  # of one study
-LONGEST_LINE = 1 << 20  # characters, of some ten thousand numbers
+# of one study
+MOST_ROWS = 10_000_000
 LIST = "a CSV or Parquet file with a column a key"
 MOST_SEED = 2**63
-ENDS = 2.0**-54, 1 - 2.0**-53  # of uniform numbers: at 0 and 1 the inverse of a normal distribution is infinite
+# of uniform numbers: at 0 and 1 the inverse of a normal distribution is infinite
+ENDS = 2.0**-54, 1 - 2.0**-53
 # kind of a distribution: its numbers in words, and SciPy's, whose quantiles are NaN for others
 FORMS: dict[str, tuple[str, Callable[..., Any]]] = {
     "uniform": ("LOW, HIGH", lambda low, high: scipy.stats.uniform(low, high - low)),
@@ -50,10 +53,14 @@ FORMS: dict[str, tuple[str, Callable[..., Any]]] = {
     "lognormal": ("MEDIAN, DEVIATION of ln", lambda median, s: scipy.stats.lognorm(s, scale=median)),
 }
 GRIDS: dict[str, tuple[str, Callable[..., Any]]] = {
-    "grid": ("LOW, HIGH, COUNT", lambda low, high, count:
-             low < high and count % 1 == 0 < count <= MOST_ROWS and np.linspace(low, high, int(count)).tolist()),
+    "grid": (
+        "LOW, HIGH, COUNT",
+        lambda low, high, count: (
+            low < high and count % 1 == 0 < count <= MOST_ROWS and np.linspace(low, high, int(count)).tolist()
+        ),
+    ),
     "values": ("at least one number", lambda *values: values),
-}  # fmt: skip
+}
 KINDS = {**FORMS, **GRIDS}
 
 
@@ -148,7 +155,11 @@ class Space:
 
     def values(self, uniform: Real) -> Real:
         """Return the drawn values (rows, drawn) of uniform numbers (rows, drawn)."""
-        fixed = {key: self.over[key].frozen.ppf(uniform[:, n]) for n, key in enumerate(self.drawn) if key in self.over}
+        fixed = {
+            key: self.over[key].frozen.ppf(uniform[:, n])
+            for n, key in enumerate(self.drawn)
+            if key in self.over
+        }
         found = np.array([*fixed.values()]).reshape(len(fixed), len(uniform)).T
         if self.posterior is None:
             return found
@@ -161,22 +172,37 @@ class Space:
 
 
 def space_of(
-    over: Mapping[str, Mapping[str, Any]], *, draws: int, seed: int, posterior: Posterior | None = None,
+    over: Mapping[str, Mapping[str, Any]],
+    *,
+    draws: int,
+    seed: int,
+    posterior: Posterior | None = None,
     listing: Listing | None = None,
-) -> Space:  # fmt: skip
+) -> Space:
     """Return the space of a declared study.  Raises ParameterError, naming the key."""
     known = {key: _distribution(f"over.{key}", entry) for key, entry in over.items()}
     found = Space(over=known, posterior=posterior, listing=listing, draws=draws, seed=seed)
     require(
-        found.keys, "over", dict(over), "nothing is varied: give --over KEY=uniform:LOW,HIGH, a list or a posterior"
+        found.keys,
+        "over",
+        dict(over),
+        "nothing is varied: give --over KEY=uniform:LOW,HIGH, a list or a posterior",
     )
-    require(not (found.grids and listing), "over", [*found.grids], "a list has every value itself: no grid with it")
+    require(
+        not (found.grids and listing),
+        "over",
+        [*found.grids],
+        "a list has every value itself: no grid with it",
+    )
     for key in found.keys:
         require(found.keys.count(key) == 1, "over", key, "is varied twice; once is enough")
     if posterior is not None:
         posterior.must_be_determined(tuple(over))
     require(
-        found.count <= MOST_ROWS, "rows", found.count, f"at most {MOST_ROWS:,} rows: fewer draws, or a coarser grid"
+        found.count <= MOST_ROWS,
+        "rows",
+        found.count,
+        f"at most {MOST_ROWS:,} rows: fewer draws, or a coarser grid",
     )
     return found
 
@@ -189,7 +215,8 @@ def _distribution(place: str, entry: Any) -> Distribution:
     must_be_known(place, kind, KINDS)
     remedy = f"{kind} needs finite numbers in order: {KINDS[kind][0]}"
     is_finite = False
-    with suppress(TypeError), np.errstate(all="ignore"):  # TypeError: no list, or another count of numbers
+    # TypeError: no list, or another count of numbers
+    with suppress(TypeError), np.errstate(all="ignore"):
         found = Distribution(kind, tuple(number(place, each, remedy) for each in numbers))
         points = found.frozen.ppf(ENDS) if kind in FORMS else found.frozen
         is_finite = points is not False and len(points) > 0 and bool(np.isfinite(points).all())
@@ -220,7 +247,12 @@ class Subjects:
         for name in (key.removeprefix(LAW) for key in self._of_law):
             case.feedback.having(name, 1.0)
             signals.append(OUTPUT_OF.get(name, name).removesuffix(".gain"))
-        require(len(set(signals)) == len(signals), "over", self._of_law, "two keys are one number of the controller")
+        require(
+            len(set(signals)) == len(signals),
+            "over",
+            self._of_law,
+            "two keys are one number of the controller",
+        )
         self._of_tuner = [key for key in keys if key.startswith(TUNER)]
         for key in self._of_tuner:
             must_be_known("tuner", key.removeprefix(TUNER), (*tuning.NUMBERS, *tuning.NUMBERS_OF_LEARNING))
@@ -232,13 +264,22 @@ class Subjects:
     @property
     def notes(self) -> list[str]:
         """The shear moduli of links whose Young's modulus is varied."""
-        words = {True: "G changes with it, at a constant Poisson's ratio", False: "G as it is stated or varied itself"}
-        return [f"{key}: {words[self._arms.is_shear_scaled(key)]}" for key in self._arms.keys if "youngs" in key]
+        words = {
+            True: "G changes with it, at a constant Poisson's ratio",
+            False: "G as it is stated or varied itself",
+        }
+        return [
+            f"{key}: {words[self._arms.is_shear_scaled(key)]}" for key in self._arms.keys if "youngs" in key
+        ]
 
     def at(self, row: Sequence[float]) -> Subject:
         """Return the case of a row.  Raises ParameterError for an illegal value."""
         values = dict(zip(self.keys, row, strict=True))
-        arm = self._arms.at({key: values[key] for key in self._arms.keys}) if self._arms.keys else self._arms.arm
+        arm = (
+            self._arms.at({key: values[key] for key in self._arms.keys})
+            if self._arms.keys
+            else self._arms.arm
+        )
         law = self.case.feedback
         for key in self._of_law:
             law = law.having(key.removeprefix(LAW), values[key])
@@ -269,9 +310,15 @@ def lines_of(path: Path) -> Iterator[Any]:
     names = tuple(next(lines, ()))
     with name_file(path):
         for name in names:
-            require(name and names.count(name) == 1, "column", name, "each column has a key of its own as its name")
+            require(
+                name and names.count(name) == 1,
+                "column",
+                name,
+                "each column has a key of its own as its name",
+            )
         yield names
-        for n, row in enumerate(lines):  # from 0, as in the results
+        # from 0, as in the results
+        for n, row in enumerate(lines):
             require(len(row) == len(names), f"row {n}", len(row), f"{len(names)} values, one a column")
             for name, cell in zip(names, row, strict=True):
                 is_finite = re.compile(r" *[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)? *", re.ASCII).fullmatch(
@@ -283,6 +330,8 @@ def lines_of(path: Path) -> Iterator[Any]:
 
 def _cells(path: Path) -> Iterator[Sequence[str]]:
     """Yield names and rows of a CSV file, or of a Parquet one by another process, a few in memory at a time."""
+    # characters, of some ten thousand numbers
+    longest_line = 1 << 20
     # of these rows, of twenty numbers
     with open_file(path, (4 << 30), key="list", what=LIST) as file:
         is_parquet = path.suffix == ".parquet" and parquet("list", str(path))
@@ -291,9 +340,11 @@ def _cells(path: Path) -> Iterator[Sequence[str]]:
             with child() if is_parquet else nullcontext(file) as rows:
                 text = io.TextIOWrapper(rows, encoding="utf-8-sig", newline="")
                 # a file without an end of a line is no reason to have it in memory
-                yield from csv.reader(iter(partial(text.readline, LONGEST_LINE), ""), strict=True)
+                yield from csv.reader(iter(partial(text.readline, longest_line), ""), strict=True)
         except (OSError, UnicodeDecodeError, csv.Error) as error:
-            raise ParameterError(key="list", value=str(path), remedy=f"cannot be read ({error}); give {LIST}") from None
+            raise ParameterError(
+                key="list", value=str(path), remedy=f"cannot be read ({error}); give {LIST}"
+            ) from None
 
 
 def parquet(key: str, value: str) -> Any:

@@ -23,7 +23,9 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-import scipy  # whose statistics take half a second to load
+
+# whose statistics take half a second to load
+import scipy
 
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.chain import Chain, file_text, load_chain
@@ -42,8 +44,7 @@ from tfarm.records import frozen
 from tfarm.schema import Column, Quantity, Table, text
 from tfarm.spectrum.gains import default_gains
 from tfarm.stopping import Progress
-
-from .quantities import (
+from tfarm.studies.quantities import (
     CARD,
     CONFIDENCE,
     STABLE,
@@ -59,7 +60,7 @@ from .quantities import (
     shares_of,
     spreads_of,
 )
-from .running import (
+from tfarm.studies.running import (
     OUT,
     ROW,
     STUDY_FILE,
@@ -75,17 +76,10 @@ from .running import (
     table_of,
     write_missing_parts,
 )
-from .space import ENDS, MOST_SEED, listing_of, space_of
+from tfarm.studies.space import ENDS, MOST_SEED, listing_of, space_of
 
 SHARES = "stable arms (confidence one-sided, Clopper-Pearson)"
 PATHS = "rows", "posterior"
-ARM_FILE = "arm.toml"
-MATRICES = "law.mat"
-BEYOND = 1e9  # in the order of worse arms: above each value of a stable loop
-LARGER_IS_WORSE = (
-    "peak", "settling_time_s", "overshoot", "time_constant_s", "residual_rms", "steady_state_error", "cost", "unstable",
-    "minimum_damping_s", "rise_time_s", "re_1_s",
-)  # fmt: skip
 BOOTSTRAP = "95 % bootstrap interval; none without any influence"
 
 
@@ -95,7 +89,9 @@ class WorstArm(NamedTuple):
     quantity: Annotated[str, Quantity("quantity", help="column of the table")]
     row: Annotated[int, Quantity("worst drawn, row", help="number of its row")]
     drawn: Annotated[float | None, Quantity("value there", "", 6, "none where its loop is not stable")]
-    found: Annotated[float | None, Quantity("value of the search", "", 6, "none where its loop is not stable")]
+    found: Annotated[
+        float | None, Quantity("value of the search", "", 6, "none where its loop is not stable")
+    ]
     evaluations: Annotated[
         int, Quantity("evaluations of the search", help="arms computed; 0 without independent ranges")
     ]
@@ -107,11 +103,17 @@ class SobolIndex(NamedTuple):
     """Shares of the variance of a quantity by one varied number (Sobol', 1993; Saltelli et al., 2010)."""
 
     quantity: Annotated[str, Quantity("quantity", help="column of the table")]
-    key: Annotated[str, Quantity("number", help="varied number; none where the indices are not determined")] = ""
+    key: Annotated[
+        str, Quantity("number", help="varied number; none where the indices are not determined")
+    ] = ""
     first: Annotated[float | None, Quantity("first order", "", 3, "share by this number alone")] = None
     first_interval: Annotated[tuple[float, float] | None, Quantity("interval", "", 3, BOOTSTRAP)] = None
-    total: Annotated[float | None, Quantity("total", "", 3, "share by this number and its interactions")] = None
-    total_interval: Annotated[tuple[float, float] | None, Quantity("interval of total", "", 3, BOOTSTRAP)] = None
+    total: Annotated[float | None, Quantity("total", "", 3, "share by this number and its interactions")] = (
+        None
+    )
+    total_interval: Annotated[tuple[float, float] | None, Quantity("interval of total", "", 3, BOOTSTRAP)] = (
+        None
+    )
     note: Annotated[str, Quantity("note", help="reason where the indices are not determined")] = ""
 
 
@@ -178,7 +180,9 @@ class Study:
         return response_quantiles(plan.subjects, rows[:: max(1, -(-self.done // most))].tolist(), output)
 
     @property
-    def shear(self) -> Annotated[str, Quantity("shear modulus", help="with a varied Young's modulus; else empty")]:
+    def shear(
+        self,
+    ) -> Annotated[str, Quantity("shear modulus", help="with a varied Young's modulus; else empty")]:
         """Shear moduli where Young's modulus is varied."""
         return "; ".join(self.parts.plan.subjects.notes)
 
@@ -193,11 +197,14 @@ class Study:
         """A row a varied number: its distribution or grid, and its value of the worst arm where that was found."""
         space = self.parts.plan.space
         kinds = {
-            key: one_line(f"{each.kind} {', '.join(map(text, each.numbers))}", 60) for key, each in space.over.items()
+            key: one_line(f"{each.kind} {', '.join(map(text, each.numbers))}", 60)
+            for key, each in space.over.items()
         }
         columns = [
             Column("key", "number", of=space.keys),
-            Column("distribution", "distribution", of=[kinds.get(key, "list or posterior") for key in space.keys]),
+            Column(
+                "distribution", "distribution", of=[kinds.get(key, "list or posterior") for key in space.keys]
+            ),
         ]
         if self.worst is not None:
             worst = list(self.worst.numbers.values())
@@ -207,11 +214,16 @@ class Study:
     @property
     def csv_table(self) -> Table:
         """Every row of the study."""
-        return Table(columns=tuple(
-            Column(name, unit=quantity_of(name).unit if name in self.parts.plan.names else "",
-                   of=["" if each != each else each for each in values.tolist()])
-            for name, values in self._table.items()
-        ))  # fmt: skip
+        return Table(
+            columns=tuple(
+                Column(
+                    name,
+                    unit=quantity_of(name).unit if name in self.parts.plan.names else "",
+                    of=["" if each != each else each for each in values.tolist()],
+                )
+                for name, values in self._table.items()
+            )
+        )
 
 
 def study(
@@ -277,19 +289,41 @@ def study(
     """
     case = Case(arm, default_gains(arm) if law is None else law, chain)
     workers = usual_workers(client) if workers is None else workers
-    for key, value in {"draws": draws, "seed": seed, "workers": workers, "part": 1 if part is None else part}.items():
+    for key, value in {
+        "draws": draws,
+        "seed": seed,
+        "workers": workers,
+        "part": 1 if part is None else part,
+    }.items():
         whole(key, value, int(key != "seed"), MOST_SEED, f"a whole number from {int(key != 'seed')}")
     known = None if posterior is None else load_posterior(posterior)
     space = space_of(
-        over or {}, draws=draws, seed=seed, posterior=known, listing=None if rows is None else listing_of(Path(rows))
+        over or {},
+        draws=draws,
+        seed=seed,
+        posterior=known,
+        listing=None if rows is None else listing_of(Path(rows)),
     )
     order = order_of(worst) if worst else ()
     plan = StudyPlan(case, space, column_names([*ask, *order]))
-    require(sobol >= 0 and sobol & (sobol - 1) == 0, "sobol", sobol, "a power of 2, such as 256; 0 for no indices")
+    require(
+        sobol >= 0 and sobol & (sobol - 1) == 0, "sobol", sobol, "a power of 2, such as 256; 0 for no indices"
+    )
     is_possible = not sobol or (space.is_independent and posterior is None and len(space.keys) > 1)
     require(is_possible, "sobol", sobol, "needs two or more independent distributions")
-    files = files_of(case, {"over": over or {}, "ask": ask, "draws": draws, "seed": seed, "rows": rows,
-                                       "posterior": posterior, "worst": worst, "sobol": sobol})  # fmt: skip
+    files = files_of(
+        case,
+        {
+            "over": over or {},
+            "ask": ask,
+            "draws": draws,
+            "seed": seed,
+            "rows": rows,
+            "posterior": posterior,
+            "worst": worst,
+            "sobol": sobol,
+        },
+    )
     engine = partial(share_tasks, count=workers) if client is None else partial(on_cluster, client=client)
     deadline = time.monotonic() + (math.inf if stop_after is None else stop_after)
     with locked_folder(Path(out), key=OUT):
@@ -347,20 +381,30 @@ def files_of(case: Case, declared: Mapping[str, Any]) -> dict[str, bytes]:
     These are the study, the arm with its chain and its [law], and the matrices of a law.  A list and a posterior keep
     their places.
     """
+    arm_file = "arm.toml"
+    matrices = "law.mat"
     own = case.law
     files = dict[str, bytes]()
     try:
         text = law_toml(own)
-    except ParameterError:  # of a state space: it has no text
+    except ParameterError:
+        # of a state space: it has no text
         columns = (*own.signals, *own.wanted)
-        files[MATRICES] = mat_content(dict(zip("ABCD", own.matrices(columns), strict=True)), "column")
-        table = {**law_head(own), "sign": -1, "matrices": MATRICES, "signals": columns}
+        files[matrices] = mat_content(dict(zip("ABCD", own.matrices(columns), strict=True)), "column")
+        table = {**law_head(own), "sign": -1, "matrices": matrices, "signals": columns}
         text = toml_text(toml_tables(table, "law"))
     places = {key: declared[key] and os.path.abspath(declared[key]) for key in PATHS}
-    over = {key: {kind: tuple(numbers) for kind, numbers in entry.items()} for key, entry in declared["over"].items()}
-    kept = {"arm": ARM_FILE, **declared, **places, "ask": tuple(declared["ask"]), "over": over}
+    over = {
+        key: {kind: tuple(numbers) for kind, numbers in entry.items()}
+        for key, entry in declared["over"].items()
+    }
+    kept = {"arm": arm_file, **declared, **places, "ask": tuple(declared["ask"]), "over": over}
     study = toml_text(toml_tables({key: value for key, value in kept.items() if value or key == "seed"}))
-    return {**files, ARM_FILE: f"{file_text(case.arm, case.chain)}\n{text}".encode(), STUDY_FILE: study.encode()}
+    return {
+        **files,
+        arm_file: f"{file_text(case.arm, case.chain)}\n{text}".encode(),
+        STUDY_FILE: study.encode(),
+    }
 
 
 # ------------------------------------------------------------------------------------------------------------ worst
@@ -371,15 +415,30 @@ def badness(order: Sequence[str], values: Mapping[str, Any]) -> float:
 
     An arm without a value is not in the order: -inf.
     """
+    # in the order of worse arms: above each value of a stable loop
+    beyond = 1e9
+    larger_is_worse = (
+        "peak",
+        "settling_time_s",
+        "overshoot",
+        "time_constant_s",
+        "residual_rms",
+        "steady_state_error",
+        "cost",
+        "unstable",
+        "minimum_damping_s",
+        "rise_time_s",
+        "re_1_s",
+    )
     value, *words = (values[name] for name in order)
     if any(word not in (None, "", STABLE) for word in words):
-        return BEYOND
+        return beyond
     if value is None or math.isnan(value):
         return -math.inf
     # of these by their size
     size = abs(value) if any(name in order[0] for name in ("peak", "steady_state_error")) else value
-    is_larger_worse = any(name in order[0] for name in LARGER_IS_WORSE)
-    return float(np.clip(size if is_larger_worse else -size, -BEYOND, BEYOND / 2))
+    is_larger_worse = any(name in order[0] for name in larger_is_worse)
+    return float(np.clip(size if is_larger_worse else -size, -beyond, beyond / 2))
 
 
 def worst_arm(study: Study, order: Sequence[str], deadline: float) -> WorstArm | None:
@@ -400,9 +459,14 @@ def worst_arm(study: Study, order: Sequence[str], deadline: float) -> WorstArm |
     values = (each[order[0]] for each in (drawn, worst))
     of_drawn, of_worst = (None if each is None or math.isnan(each) else float(each) for each in values)
     return WorstArm(
-        quantity=order[0], row=first, drawn=of_drawn, found=of_worst, evaluations=len(seen), numbers=numbers,
+        quantity=order[0],
+        row=first,
+        drawn=of_drawn,
+        found=of_worst,
+        evaluations=len(seen),
+        numbers=numbers,
         file=str(write_case(study.parts, numbers)),
-    )  # fmt: skip
+    )
 
 
 def search_worst(parts: StudyFolder, order: Sequence[str], first: int, deadline: float) -> list[Row] | None:
@@ -418,16 +482,19 @@ def search_worst(parts: StudyFolder, order: Sequence[str], first: int, deadline:
     with np.errstate(all="ignore"):
         is_bounded = np.isfinite(space.values(np.array([0 * start, 0 * start + 1]))).all(axis=0)
     edge = np.minimum(np.where(is_bounded, 0.0, 0.5 / space.draws), np.minimum(start, 1 - start))
-    step = 0.05  # of the probability of each number
+    # of the probability of each number
+    step = 0.05
     steps = np.diag(np.where(start < 0.5, step, -step))
     most = 20 + 20 * len(start)
 
     def search(result: Callable[[Real], Row]) -> None:
         scipy.optimize.minimize(  # type: ignore[call-overload]  # bounds as an array
-            lambda u: -badness(order, result(space.values(u[None]))), start, method="Nelder-Mead",
+            lambda u: -badness(order, result(space.values(u[None]))),
+            start,
+            method="Nelder-Mead",
             bounds=np.array([edge, 1 - edge]).T,
             options={"maxfev": most, "initial_simplex": [start, *(start + steps)]},
-        )  # fmt: skip
+        )
 
     return search_rows(parts.others(f"_worst-{order[0]}-", most, 1, order), search, deadline)
 
@@ -438,7 +505,8 @@ def write_case(parts: StudyFolder, numbers: Mapping[str, float]) -> Path:
     file = parts.folder / "worst.toml"
     case = plan.subjects.at([*numbers.values()]).case
     text = file_text(replace(case.arm, name=f"{plan.case.arm.name}-worst"), case.chain)
-    with suppress(ParameterError):  # of a state space, which has no table
+    # of a state space, which has no table
+    with suppress(ParameterError):
         text = f"{text}\n{law_toml(case.law)}"
     write_file(file, text.encode(), key=OUT)
     return file
@@ -458,10 +526,14 @@ def sobol_indices(
     plan = study.plan
     keys = study.plan.space.keys
     names = [name for name in plan.names if quantity_of(name).is_number and quantity_of(name).label]
-    A, B = np.hsplit(scipy.stats.qmc.Sobol(2 * len(keys), rng=np.random.default_rng(plan.space.seed)).random(size), 2)
-    pages = [np.where(np.arange(len(keys)) == n, B, A) for n in range(len(keys))]  # A with one column of B
+    A, B = np.hsplit(
+        scipy.stats.qmc.Sobol(2 * len(keys), rng=np.random.default_rng(plan.space.seed)).random(size), 2
+    )
+    # A with one column of B
+    pages = [np.where(np.arange(len(keys)) == n, B, A) for n in range(len(keys))]
     rows = plan.space.values(np.clip(np.vstack([A, B, *pages]), *ENDS))
-    parts = study.others(f"_sobol-{size}-", len(rows), 64, plan.names)  # all workers have some of a small sample
+    # all workers have some of a small sample
+    parts = study.others(f"_sobol-{size}-", len(rows), 64, plan.names)
     if not parts.is_complete:
         seconds = seconds_an_arm(plan, rows) * len(rows) / workers
         progress(0, 0, f"Sobol' indices of {len(rows):,} further arms, about {seconds:.0f} s")
@@ -475,16 +547,27 @@ def _indices(name: str, keys: Sequence[str], values: Real) -> Iterator[SobolInde
     """Yield the indices of the values of a quantity: of A, of B and of a page a number, N arms each."""
     missing = int(np.sum(~np.isfinite(values)))
     if missing or np.ptp(values) == 0:
-        yield SobolIndex(quantity=name, note=f"no finite value on {missing:,} arms" if missing else "no variance")
+        yield SobolIndex(
+            quantity=name, note=f"no finite value on {missing:,} arms" if missing else "no variance"
+        )
         return
     f_A, f_B, *f_AB = values.reshape(len(keys) + 2, 1, -1)
     found: Any = scipy.stats.sobol_indices(func={"f_A": f_A, "f_B": f_B, "f_AB": np.array(f_AB)}, n=f_A.size)
-    no_interval: Any = scipy.stats.DegenerateDataWarning  # of an index that does not vary
+    # of an index that does not vary
+    no_interval: Any = scipy.stats.DegenerateDataWarning
     with warnings.catch_warnings(action="ignore", category=no_interval), np.errstate(all="ignore"):
         ends = found.bootstrap(confidence_level=CONFIDENCE)
     first = ends.first_order.confidence_interval
     total = ends.total_order.confidence_interval
     columns = found.first_order, first.low, first.high, found.total_order, total.low, total.high
-    for key, S, S_low, S_high, T, T_low, T_high in zip(keys, *(np.ravel(of).tolist() for of in columns), strict=True):
-        yield SobolIndex(quantity=name, key=key, first=S, first_interval=(S_low, S_high), total=T,
-                         total_interval=(T_low, T_high))  # fmt: skip
+    for key, S, S_low, S_high, T, T_low, T_high in zip(
+        keys, *(np.ravel(of).tolist() for of in columns), strict=True
+    ):
+        yield SobolIndex(
+            quantity=name,
+            key=key,
+            first=S,
+            first_interval=(S_low, S_high),
+            total=T,
+            total_interval=(T_low, T_high),
+        )

@@ -26,12 +26,29 @@ from tfarm.synthesis.judge import LOST, OBJECTIVES, Judge, judge_of, model_sizes
 from tfarm.synthesis.models import slew_and_after, trial_slew
 from tfarm.synthesis.search import Search, Worst, flat_part, search
 from tfarm.synthesis.structures import Bounds, Structure, check_bounds, structure_of
-from tfarm.synthesis.worst_case import ArmBox, Effort, NamedArm, Tell, WorstCase, arms_of, for_the_worst, same_input
+from tfarm.synthesis.worst_case import (
+    ArmBox,
+    Effort,
+    NamedArm,
+    Tell,
+    WorstCase,
+    arms_of,
+    for_the_worst,
+    same_input,
+)
 
 CONSUMER = Consumer(
     "design",
     acts=("reference", "anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
-    partly=("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit", "arithmetic"),
+    partly=(
+        "encoder",
+        "amplifier steps",
+        "amplifier range",
+        "DAC steps",
+        "DAC range",
+        "torque limit",
+        "arithmetic",
+    ),
     none=("volts",),
 )
 LoopKind = Literal["sampled", "continuous"]
@@ -42,12 +59,17 @@ class OnArm:
     """Value of the objective and both verdicts on one of the arms of a design; `numbers` are those of the box."""
 
     name: Annotated[
-        str, Quantity("arm", key="name", help="the designed arm, a further one, or one with numbers of the ranges")
+        str,
+        Quantity(
+            "arm", key="name", help="the designed arm, a further one, or one with numbers of the ranges"
+        ),
     ]
     numbers: Annotated[
         dict[str, float], Quantity("numbers of the arm", help="values of the numbers in the ranges, by key")
     ]
-    value: Annotated[float, Quantity("objective", key="value", help="the objective with this law on this arm")]
+    value: Annotated[
+        float, Quantity("objective", key="value", help="the objective with this law on this arm")
+    ]
     verdict: Stability
     sampled: SampledBrief
 
@@ -59,19 +81,25 @@ class OnArm:
         return self.verdict.word
 
     @property
-    def known_beyond(self) -> Annotated[bool, Quantity(help="whether the verdict holds for all higher modes too")]:
+    def known_beyond(
+        self,
+    ) -> Annotated[bool, Quantity(help="whether the verdict holds for all higher modes too")]:
         """Whether that holds beyond its frequency range."""
         return self.verdict.is_known_beyond
 
     @property
     def band(
         self,
-    ) -> Annotated[float, Quantity(key="up_to_rad_s", help="upper end of the frequency range of the verdict [rad/s]")]:
+    ) -> Annotated[
+        float, Quantity(key="up_to_rad_s", help="upper end of the frequency range of the verdict [rad/s]")
+    ]:
         """The frequency range of that verdict [rad/s]."""
         return self.verdict.band
 
     @property
-    def sampled_loop(self) -> Annotated[str, Quantity("sampled loop", key="sampled", help="stability at the samples")]:
+    def sampled_loop(
+        self,
+    ) -> Annotated[str, Quantity("sampled loop", key="sampled", help="stability at the samples")]:
         """The verdict on the sampled loop."""
         return self.sampled.short
 
@@ -89,8 +117,12 @@ class OptimalCoefficient(NamedTuple):
             help="range with an objective within 1 % of the best, others fixed",
         ),
     ]
-    bounds: Annotated[Bounds | None, Quantity("searched", help="bounds of the search; none of a fixed coefficient")]
-    optimum: Annotated[str, Quantity("optimum", help="place of the value in its bounds; at a bound it is no optimum")]
+    bounds: Annotated[
+        Bounds | None, Quantity("searched", help="bounds of the search; none of a fixed coefficient")
+    ]
+    optimum: Annotated[
+        str, Quantity("optimum", help="place of the value in its bounds; at a bound it is no optimum")
+    ]
 
 
 @frozen
@@ -112,22 +144,30 @@ class Design:
     law: Any
     coefficients: dict[str, float]
     value: Annotated[float, Quantity("value of the objective", key="value", help="the worst over the arms")]
-    verdict: Annotated[Stability, Quantity(flat=True, help="stability of the continuous-time loop on the designed arm")]
+    verdict: Annotated[
+        Stability, Quantity(flat=True, help="stability of the continuous-time loop on the designed arm")
+    ]
     bounds: dict[str, Bounds]
     flat: dict[str, Bounds]
     modes: Annotated[int, Quantity("flexible modes in the objective", help="modes whose damping counts")]
     at_bound: tuple[str, ...]
     at_limit: tuple[str, ...]
     widened: tuple[str, ...]
-    loop: Annotated[LoopKind, Quantity("designed for the loop", key="designed_for", help="sampled or continuous")]
+    loop: Annotated[
+        LoopKind, Quantity("designed for the loop", key="designed_for", help="sampled or continuous")
+    ]
     chain: Chain
-    sampled: Annotated[SampledBrief, Quantity("sampled loop", help="stability at the samples on the designed arm")]
+    sampled: Annotated[
+        SampledBrief, Quantity("sampled loop", help="stability at the samples on the designed arm")
+    ]
     arms: Annotated[tuple[OnArm, ...], Quantity("arms", help="all arms that the law was designed for")]
     starts: Annotated[int, Quantity("searches", help="minimisations from different starts")]
     agreed: Annotated[
         int,
         Quantity(
-            "searches within half a per cent of the best", key="starts_agreed", help="few: the optimum is hard to find"
+            "searches within half a per cent of the best",
+            key="starts_agreed",
+            help="few: the optimum is hard to find",
         ),
     ]
     worst_case: WorstCase
@@ -135,20 +175,28 @@ class Design:
     @property
     def rows(
         self,
-    ) -> Annotated[list[OptimalCoefficient], Quantity("coefficients", key="coefficients", help="numbers of the law")]:
+    ) -> Annotated[
+        list[OptimalCoefficient], Quantity("coefficients", key="coefficients", help="numbers of the law")
+    ]:
         """One row for each coefficient."""
-        optima = dict.fromkeys(self.bounds, "inside") | dict.fromkeys(self.widened, "inside bounds that were widened")
+        optima = dict.fromkeys(self.bounds, "inside") | dict.fromkeys(
+            self.widened, "inside bounds that were widened"
+        )
         optima |= dict.fromkeys(self.at_bound, "none: search cut off at the bound")
         optima |= dict.fromkeys(self.at_limit, "at the physical limit")
         return [
-            OptimalCoefficient(name, value, self.flat.get(name), self.bounds.get(name), optima.get(name, "given"))
+            OptimalCoefficient(
+                name, value, self.flat.get(name), self.bounds.get(name), optima.get(name, "given")
+            )
             for name, value in self.coefficients.items()
         ]
 
     @property
     def slew_duration(
         self,
-    ) -> Annotated[float | None, Quantity("record of the slew", "s", 6, "duration over which the objective is taken")]:
+    ) -> Annotated[
+        float | None, Quantity("record of the slew", "s", 6, "duration over which the objective is taken")
+    ]:
         """Length of the record of a residual or a cost, for `tfarm simulate --duration`; None of others."""
         of_residual = self.objective == "residual"
         if self.loop == "continuous" or not (of_residual or self.objective == "cost"):
@@ -165,7 +213,9 @@ class Design:
     @property
     def tried(
         self,
-    ) -> Annotated[int, Quantity(key="arms_tried_inside", help="arms inside the ranges on which the law was tried")]:
+    ) -> Annotated[
+        int, Quantity(key="arms_tried_inside", help="arms inside the ranges on which the law was tried")
+    ]:
         """Number of arms inside the box that were tried."""
         return self.worst_case.tried
 
@@ -173,7 +223,8 @@ class Design:
     def worst_case_words(
         self,
     ) -> Annotated[
-        str, Quantity("worst case", key="worst_case_in_words", help="choice of the arms; no proof between them")
+        str,
+        Quantity("worst case", key="worst_case_in_words", help="choice of the arms; no proof between them"),
     ]:
         """Choice of the arms."""
         return self.worst_case.sentence(len(self.arms))
@@ -190,10 +241,20 @@ class _Choice(NamedTuple):
 
 
 def design(
-    arm: Arm, objective: str = "damping", *, structure: str = TWO_GAINS, K1: Bounds | None = None,
-    K2: Bounds | None = None, Kp: float = 0.0, modes: int = 2, chain: Chain | None = None, continuous: bool = False,
-    progress: Tell | None = None, also: Sequence[Arm] = (), ranges: Mapping[str, Bounds] | None = None,
-) -> Design:  # fmt: skip
+    arm: Arm,
+    objective: str = "damping",
+    *,
+    structure: str = TWO_GAINS,
+    K1: Bounds | None = None,
+    K2: Bounds | None = None,
+    Kp: float = 0.0,
+    modes: int = 2,
+    chain: Chain | None = None,
+    continuous: bool = False,
+    progress: Tell | None = None,
+    also: Sequence[Arm] = (),
+    ranges: Mapping[str, Bounds] | None = None,
+) -> Design:
     """Return the law of a structure with the best value of an objective in the sampled loop of a chain (default 10 ms).
 
     Structures are those of `tfarm.synthesis.structures`: "K1-K2", gains of rate and moment, within the bounds `K1` and
@@ -222,7 +283,9 @@ def design(
     for each in arms:
         admit(CONSUMER, each.arm, chain)
     same_input(arms)
-    form = structure_of(structure, arm, Kp=Kp, modes=modes, period=chain.sampling.period, bounds={"K1": K1, "K2": K2})
+    form = structure_of(
+        structure, arm, Kp=Kp, modes=modes, period=chain.sampling.period, bounds={"K1": K1, "K2": K2}
+    )
     for each in arms:
         ContinuousLoop(Case(each.arm, form.record_at(form.origin)))
         check_bounds(form, each.arm)
@@ -249,8 +312,16 @@ class _DesignTask:
 
     def judge(self, on: Arm, count: int) -> Judge:
         """The judge of laws on an arm, by a model of `count` modes."""
-        return judge_of(on, self.arm, self.chain, self.objective, self.form.signals, self.modes, count,
-                        continuous=self.continuous)  # fmt: skip
+        return judge_of(
+            on,
+            self.arm,
+            self.chain,
+            self.objective,
+            self.form.signals,
+            self.modes,
+            count,
+            continuous=self.continuous,
+        )
 
     def find(self, named: Sequence[NamedArm], before: _Choice | None, effort: Effort) -> _Choice:
         """Return the best law that is stable on all arms, near the one found `before`, if any.
@@ -262,9 +333,11 @@ class _DesignTask:
         near = None if before is None else before.x
         for step in range(max(map(len, sizes))):
             several = tuple(
-                self.judge(each.arm, own[min(step, len(own) - 1)]) for each, own in zip(named, sizes, strict=True)
+                self.judge(each.arm, own[min(step, len(own) - 1)])
+                for each, own in zip(named, sizes, strict=True)
             )
-            last_first = Worst(several[::-1])  # corners, and what was worst inside the box: most laws are lost there
+            # corners, and what was worst inside the box: most laws are lost there
+            last_first = Worst(several[::-1])
             found = search(last_first, self.form, self.tell, near, effort)
             nearest = min(nearest, found.found[0], key=itemgetter(0))
             for score, x in found.found:
@@ -292,19 +365,33 @@ class _DesignTask:
         on_arms = []
         for each, judge in zip(named, choice.worst.judges, strict=True):
             on_arm = judge.case(law)
-            on_arms.append(OnArm(each.name, each.numbers, judge.value(law), stability(on_arm), sampled_brief(on_arm)))
+            on_arms.append(
+                OnArm(each.name, each.numbers, judge.value(law), stability(on_arm), sampled_brief(on_arm))
+            )
         at_ends = own.at_ends(x)
         return Design(
-            objective=self.objective, structure=own.name, law=law,
+            objective=self.objective,
+            structure=own.name,
+            law=law,
             coefficients=own.fixed | dict(zip(own.names, own.coefficients(x).tolist(), strict=True)),
-            value=OBJECTIVES[self.objective].worst([each.value for each in on_arms]), verdict=on_arms[0].verdict,
-            bounds={each.name: each.bounds for each in own.free}, flat=flat_part(choice.worst, own, x, choice.score),
-            modes=self.modes, at_bound=tuple(own.names[place] for place, _ in at_ends),
-            at_limit=tuple(own.names[place] for place, end in at_ends if (place, end) in own.ends(physical=True)),
-            widened=choice.search.widened, loop="continuous" if self.continuous else "sampled", chain=self.chain,
-            sampled=on_arms[0].sampled, arms=tuple(on_arms), starts=choice.search.starts, agreed=choice.search.agreed,
+            value=OBJECTIVES[self.objective].worst([each.value for each in on_arms]),
+            verdict=on_arms[0].verdict,
+            bounds={each.name: each.bounds for each in own.free},
+            flat=flat_part(choice.worst, own, x, choice.score),
+            modes=self.modes,
+            at_bound=tuple(own.names[place] for place, _ in at_ends),
+            at_limit=tuple(
+                own.names[place] for place, end in at_ends if (place, end) in own.ends(physical=True)
+            ),
+            widened=choice.search.widened,
+            loop="continuous" if self.continuous else "sampled",
+            chain=self.chain,
+            sampled=on_arms[0].sampled,
+            arms=tuple(on_arms),
+            starts=choice.search.starts,
+            agreed=choice.search.agreed,
             worst_case=case,
-        )  # fmt: skip
+        )
 
 
 def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Chain | None, size: int) -> str:
@@ -316,12 +403,13 @@ def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Cha
     text = f"no law {form.name} with {within} was found that is stable"
     if chain is None:
         return f"{text}: widen the bounds"
-    verdict = max((sampled_verdict(Case(each.arm, law, chain)) for each in arms), key=lambda each: each.log_radius)
+    verdict = max(
+        (sampled_verdict(Case(each.arm, law, chain)) for each in arms), key=lambda each: each.log_radius
+    )
     growth = np.expm1(verdict.log_radius)
     nearest = f"{verdict.slowest} grows by {growth:.2g} a sample" if growth > 0 else "there is no reserve"
-    text = (
-        f"{text} when sampled: under the nearest law {nearest}; widen the bounds, or try another {ANGLE_GAIN} or period"
-    )
+    remedy = f"widen the bounds, or try another {ANGLE_GAIN} or period"
+    text = f"{text} when sampled: under the nearest law {nearest}; {remedy}"
     if any(most_modes(each.arm, chain) > size for each in arms if not each.arm.has_elastic_link):
         text = f"{text}; only models of up to {size} modes were searched"
     if not verdict.loop.plant.arm.has_elastic_link or form.name == TWO_GAINS:

@@ -39,10 +39,12 @@ from tfarm.records import frozen
 from tfarm.synthesis.models import DesignModel, Slews, continuous_model, sampled_model, slew_and_after
 from tfarm.synthesis.structures import Entry
 
-LONGEST_MARGIN = 100.0  # samples, or s: the longest delay margin, and that where |L| is nowhere 1
-RESERVE = 1.25  # factor on all gains with which the loop is stable, up and down: the error of a gauge or motor
-FEWEST_MODES = 8  # of the first model; more where its best laws are unstable
-LOST = 1e30  # score where a loop is unstable, and as much for each later condition: above any value in SI units
+# samples, or s: the longest delay margin, and that where |L| is nowhere 1
+LONGEST_MARGIN = 100.0
+# factor on all gains with which the loop is stable, up and down: the error of a gauge or motor
+RESERVE = 1.25
+# score where a loop is unstable, and as much for each later condition: above any value in SI units
+LOST = 1e30
 
 
 def damping_of(model: DesignModel, poles: Complex) -> Real:
@@ -146,7 +148,8 @@ class Judge:
 
         An objective of poles has the model itself.
         """
-        reserve = 1.002 * RESERVE  # edges of the model's few modes have a smaller error
+        # edges of the model's few modes have a smaller error
+        reserve = 1.002 * RESERVE
         shares = (reserve, 1 / reserve) * self.is_sampled + (1.0,) * (not self.objective.of_poles)
         return [*((self.model, share) for share in shares), *((each, 1.0) for each in self.also)]
 
@@ -172,7 +175,8 @@ class Judge:
     def aims(self, entries: Sequence[Entry]) -> Real:
         """The objective by the judge's own model alone; of its poles `LOST` and more where one is unstable."""
         if not self.objective.of_poles:
-            with np.errstate(all="ignore"):  # slews of unstable laws
+            # slews of unstable laws
+            with np.errstate(all="ignore"):
                 return np.nan_to_num(self.objective.scores(self, entries, None), nan=np.inf)
         poles = self.model.poles(entries)
         growth = self.model.growth(poles).max(axis=1)
@@ -231,8 +235,11 @@ class Judge:
         shares = (1.0, 1 / RESERVE, RESERVE) if self.is_sampled else ()
         cases = (self.case(law.times(share)) for share in shares)
         try:
-            return stability(self.case(law)).is_stable and all(sampled_verdict(each).is_stable for each in cases)
-        except ConvergenceError:  # a pole on the axis or the circle
+            return stability(self.case(law)).is_stable and all(
+                sampled_verdict(each).is_stable for each in cases
+            )
+        except ConvergenceError:
+            # a pole on the axis or the circle
             return False
 
 
@@ -257,7 +264,8 @@ OBJECTIVES = {
     ),
     "margin": Objective(disk_score, Judge.disk_margin, is_negated=True, of_poles=True),
     "sensitivity": Objective(
-        lambda judge, entries, _: judge.peak(abs(1 + judge.model.loop(entries)).min(axis=1)), Judge.peak_sensitivity
+        lambda judge, entries, _: judge.peak(abs(1 + judge.model.loop(entries)).min(axis=1)),
+        Judge.peak_sensitivity,
     ),
     "delay": Objective(delay_score, Judge.delay_margin, is_negated=True, of_poles=True),
     "residual": Objective(
@@ -272,20 +280,29 @@ def model_sizes(arm: Arm, chain: Chain, modes: int, *, continuous: bool) -> list
 
     Without damping there is one, that of the sampled verdict.
     """
-    fewest = modes + FEWEST_MODES // 2
+    # of the first model; more where its best laws are unstable
+    fewest_modes = 8
+    fewest = modes + fewest_modes // 2
     if continuous or arm.has_elastic_link:
-        return [max(FEWEST_MODES if continuous else UNDAMPED_MODES, fewest)]
+        return [max(fewest_modes if continuous else UNDAMPED_MODES, fewest)]
     # with twice as many modes a law takes eight times as long
     most = min(most_modes(arm, chain), 32)
-    doubled = (max(FEWEST_MODES, fewest) << n for n in range(most.bit_length()))
+    doubled = (max(fewest_modes, fewest) << n for n in range(most.bit_length()))
     return [*(size for size in doubled if size < most), most]
 
 
 @lru_cache(64)  # those of the arms inside a box, which are the same in each exchange
 def judge_of(
-    arm: Arm, known: Arm, chain: Chain, objective: str, signals: tuple[str, ...], modes: int, count: int, *,
+    arm: Arm,
+    known: Arm,
+    chain: Chain,
+    objective: str,
+    signals: tuple[str, ...],
+    modes: int,
+    count: int,
+    *,
     continuous: bool = False,
-) -> Judge:  # fmt: skip
+) -> Judge:
     """The judge of laws on these signals, with `count` flexible modes; more of the continuous-time loop."""
     aim = OBJECTIVES[objective]
     signals = tuple(dict.fromkeys((*signals, *("root_moment",) * aim.of_slew)))
@@ -322,7 +339,9 @@ def scores_of(judges: Sequence[Judge], entries: Sequence[Entry], limits: Real) -
     return scores
 
 
-def _add_aims(judges: Sequence[Judge], entries: Sequence[Entry], which: Any, scores: Real, limits: Real) -> None:
+def _add_aims(
+    judges: Sequence[Judge], entries: Sequence[Entry], which: Any, scores: Real, limits: Real
+) -> None:
     """Raise the scores of some laws to their objective by each judge in turn, up to their limits."""
     for judge in judges:
         left = np.flatnonzero(which & (scores <= limits) & (scores < LOST))
@@ -333,5 +352,6 @@ def _add_aims(judges: Sequence[Judge], entries: Sequence[Entry], which: Any, sco
 def chosen(entries: Sequence[Entry], rows: Any) -> list[Entry]:
     """The entries of some of the laws; polynomials that are common to all laws stay."""
     return [
-        Entry(each.signal, *(of[:, rows] if of.shape[1] > 1 else of for of in (each.num, each.den))) for each in entries
+        Entry(each.signal, *(of[:, rows] if of.shape[1] > 1 else of for of in (each.num, each.den)))
+        for each in entries
     ]

@@ -152,7 +152,8 @@ class DesignModel:
             s = self.speed * (z - 1) / np.where(abs(z + 1) < 1e-12, 1e-12, z + 1)
         total = 0.0
         for signal, num, den in entries:
-            through = np.polyval(num[:, :, None], s) / np.polyval(den[:, :, None], s)  # (laws, m)
+            # (laws, m)
+            through = np.polyval(num[:, :, None], s) / np.polyval(den[:, :, None], s)
             total = total + through * response[self.signals.index(signal)]
         return np.asarray(total)
 
@@ -160,7 +161,8 @@ class DesignModel:
 def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int, speed: float) -> DesignModel:
     """The continuous-time loop of `count` flexible modes; its response is that of the exact arm."""
     A, B, C, D = sensed_model(arm, signals, count)
-    if arm.has_rigid_mode and "hub_angle" not in signals:  # an angle without feedback is no state of the loop
+    # an angle without feedback is no state of the loop
+    if arm.has_rigid_mode and "hub_angle" not in signals:
         A = A[1:, 1:]
         B = B[1:]
         C = C[:, 1:]
@@ -168,7 +170,16 @@ def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int,
     top = frequency_above_mode(arm, modes)
     moment = C[signals.index("root_moment")] if "root_moment" in signals else np.zeros(len(A))
     return DesignModel(
-        (A, B, C, D), signals, speed, None, lambda: grid(arm, top), lambda w: read.values(1j * w), top, (), 0, moment
+        (A, B, C, D),
+        signals,
+        speed,
+        None,
+        lambda: grid(arm, top),
+        lambda w: read.values(1j * w),
+        top,
+        (),
+        0,
+        moment,
     )
 
 
@@ -207,12 +218,20 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
     B = np.delete(B, gone)
     C = np.delete(C, gone, 1)[: len(signals)]
     beyond = np.nonzero((pulse.mode > modes) & (pulse.poles.imag >= 0))[0]
-    higher = pulse.multipliers[beyond[np.argsort(-pulse.mode[beyond], kind="stable")]]  # the highest come first
+    # the highest come first
+    higher = pulse.multipliers[beyond[np.argsort(-pulse.mode[beyond], kind="stable")]]
     return DesignModel(
-        (A, B[:, None], C, np.zeros((len(C), 1))), signals, 2 / T, T, lambda: circle_angles(pulse),
-        lambda q: response(np.exp(1j * q))[: len(signals)], np.inf,
-        tuple(complex(each.real, abs(each.imag)) for each in higher), first + 2 - len(gone), np.delete(own, gone),
-    )  # fmt: skip
+        (A, B[:, None], C, np.zeros((len(C), 1))),
+        signals,
+        2 / T,
+        T,
+        lambda: circle_angles(pulse),
+        lambda q: response(np.exp(1j * q))[: len(signals)],
+        np.inf,
+        tuple(complex(each.real, abs(each.imag)) for each in higher),
+        first + 2 - len(gone),
+        np.delete(own, gone),
+    )
 
 
 def difference_rate(
@@ -274,7 +293,9 @@ def in_blocks(signals: Real, first: int) -> Blocks:
     after = -(before + number) % size
     scale = np.maximum(abs(signals).max(axis=1), LEAST_SIZE)[:, None, None]
     r = np.pad(signals, ((0, 0), (before, after))).reshape(inputs, -1, size) / scale
-    basis, weights, shares = np.linalg.svd(np.moveaxis(r, 1, 2).reshape(inputs * size, -1), full_matrices=False)
+    basis, weights, shares = np.linalg.svd(
+        np.moveaxis(r, 1, 2).reshape(inputs * size, -1), full_matrices=False
+    )
     # of the largest singular value: rounding of the signals of a slew
     rank = (weights > 1e-11 * weights[0]).sum()
     basis = (basis * weights)[:, :rank].reshape(inputs, size, rank) * scale
@@ -292,17 +313,21 @@ def squares(A: Real, B: Real, C: Real, D: Real, signals: Blocks) -> Real:
     rows = C
     columns = B
     power = A
-    while rows.shape[1] < size * seen:  # C, C A, ...; ..., A B, B
+    # C, C A, ...; ..., A B, B
+    while rows.shape[1] < size * seen:
         rows = np.concatenate([rows, rows @ power], axis=1)
         columns = np.concatenate([power @ columns, columns], axis=2)
         power = power @ power
     basis = signals.basis.reshape(inputs, -1)
-    echo = np.concatenate([D, rows @ B], axis=1).reshape(laws, -1, seen, inputs)  # after each number of samples
+    # after each number of samples
+    echo = np.concatenate([D, rows @ B], axis=1).reshape(laws, -1, seen, inputs)
     direct = np.zeros((laws, seen, size, rank))
     for k in range(size):
         direct[:, :, k:] += (echo[:, k] @ basis[:, : (size - k) * rank]).reshape(laws, seen, -1, rank)
     together = np.concatenate([rows, np.moveaxis(direct, 1, 2).reshape(laws, -1, rank)], axis=2)
-    push = np.moveaxis(columns @ np.moveaxis(signals.basis, 0, 1).reshape(-1, rank) @ signals.shares, 2, 0)[..., None]
+    push = np.moveaxis(columns @ np.moveaxis(signals.basis, 0, 1).reshape(-1, rank) @ signals.shares, 2, 0)[
+        ..., None
+    ]
     x = np.zeros_like(push)
     for k in range(1, len(x)):
         x[k] = power @ x[k - 1] + push[k - 1]
@@ -313,7 +338,8 @@ def squares(A: Real, B: Real, C: Real, D: Real, signals: Blocks) -> Real:
     return (outputs**2).sum(axis=(1, 2))
 
 
-PERIOD_POINTS = 64  # of the period after the slew, in continuous time
+# of the period after the slew, in continuous time
+PERIOD_POINTS = 64
 
 
 def slew_and_after(arm: Arm, known: Arm, chain: Chain) -> Scenario:
@@ -355,7 +381,9 @@ class Slews:
         C[:, 0, : read.size], C[:, 1] = read, A[:, model.last]
         D[:, 1] = B[:, model.last]
         D[:, (0, 1), (-2, -1)] = -1.0
-        weights = np.sqrt(np.array(trial_weights(self.known, self.chain)) * self.chain.sampling.period / 2)[:, None]
+        weights = np.sqrt(np.array(trial_weights(self.known, self.chain)) * self.chain.sampling.period / 2)[
+            :, None
+        ]
         return squares(A, B, weights * C, weights * D, self._trial)
 
     @cached_property

@@ -24,12 +24,14 @@ from tfarm.synthesis.structures import Bounds, Structure
 from tfarm.synthesis.worst_case import Effort, Tell
 
 MOST_RUNS = 8
-STRATEGIES = (("best1bin", 0.7), ("currenttobest1bin", 0.9))  # in turn, and the share of coefficients changed at once
-CONVERGED = 1e-9  # of the scores: the spread of a run's points at which it ends
-BEYOND = 4.0  # of x: reach of a search beyond its bounds, a factor e^4 of a coefficient far above its unit
+# of the scores: the spread of a run's points at which it ends
+CONVERGED = 1e-9
+# of x: reach of a search beyond its bounds, a factor e^4 of a coefficient far above its unit
+BEYOND = 4.0
 
 
-Score = Callable[..., Real]  # of points (n, k), and of limits
+# of points (n, k), and of limits
+Score = Callable[..., Real]
 
 
 class Points(NamedTuple):
@@ -68,21 +70,29 @@ class Worst(NamedTuple):
     @property
     def work(self) -> float:
         """The work of a law, relative to that of one arm and its first model."""
-        squares = sum((4 if judge.is_sampled else 1) * len(judge.model.plant[0]) ** 2 for judge in self.judges)
+        squares = sum(
+            (4 if judge.is_sampled else 1) * len(judge.model.plant[0]) ** 2 for judge in self.judges
+        )
         # models times squared states of one arm's first model: with twice as much half the runs
         return squares / (4 * 20**2)
 
     def scores(self, form: Structure, x: Real, limits: Real | None = None) -> Real:
         """The function to be minimised, at points x (n, laws), any value above the limit of a law (see `scores_of`)."""
         limits = np.full(x.shape[1], np.inf) if limits is None else limits
-        at_once = 256  # a limit of memory
+        # a limit of memory
+        at_once = 256
         parts = (slice(i, i + at_once) for i in range(0, x.shape[1], at_once))
         return np.concatenate(
-            [scores_of(self.judges, form.entries(form.coefficients(x[:, part])), limits[part]) for part in parts]
+            [
+                scores_of(self.judges, form.entries(form.coefficients(x[:, part])), limits[part])
+                for part in parts
+            ]
         )
 
 
-def search(judge: Worst, form: Structure, tell: Tell, near: Real | None = None, effort: Effort = "whole") -> Search:
+def search(
+    judge: Worst, form: Structure, tell: Tell, near: Real | None = None, effort: Effort = "whole"
+) -> Search:
     """Return the best laws of a structure near its bounds, which are widened where the best lies beyond.
 
     `near` (n,) is the best point of a judge with fewer arms, with which the first run begins.
@@ -98,7 +108,9 @@ def search(judge: Worst, form: Structure, tell: Tell, near: Real | None = None, 
         # a coefficient is at its physical end if the score there is as good
         if judge.scores(region, moved)[0] <= scores[0] + 1e-4 * abs(scores[0]):
             x[:, :1] = moved
-    beyond = [(place, end) for place, end in movable if (2 * end - 1) * (x[place, 0] - form.box[end][place]) > 0]
+    beyond = [
+        (place, end) for place, end in movable if (2 * end - 1) * (x[place, 0] - form.box[end][place]) > 0
+    ]
     widened = tuple(dict.fromkeys(form.names[place] for place, _ in beyond))
     found = [(float(scores[n]), x[:, n]) for n in _apart(region, x, scores)]
     # a run agrees if its score is worse than the best by less
@@ -107,7 +119,13 @@ def search(judge: Worst, form: Structure, tell: Tell, near: Real | None = None, 
 
 
 def minimise_runs(
-    score: Score, form: Structure, box: tuple[Real, Real], work: float, tell: Tell, near: Real | None, effort: Effort
+    score: Score,
+    form: Structure,
+    box: tuple[Real, Real],
+    work: float,
+    tell: Tell,
+    near: Real | None,
+    effort: Effort,
 ) -> tuple[Points, list[float]]:
     """Return the last points of all runs, and the best score of each.
 
@@ -155,7 +173,9 @@ def minimise_runs(
 
 def evolve_points(score: Score, box: tuple[Real, Real], points: Real, rounds: int, seed: int) -> Points:
     """The last points of a run of differential evolution that begins with `points` (n, m)."""
-    strategy, recombination = STRATEGIES[seed % len(STRATEGIES)]
+    # in turn, and the share of coefficients changed at once
+    strategies = (("best1bin", 0.7), ("currenttobest1bin", 0.9))
+    strategy, recombination = strategies[seed % len(strategies)]
     limits = np.full(points.shape[1], np.inf)
 
     def after(intermediate_result: Any) -> None:
@@ -163,10 +183,19 @@ def evolve_points(score: Score, box: tuple[Real, Real], points: Real, rounds: in
         limits[:] = intermediate_result.population_energies
 
     done = cast("Any", differential_evolution)(
-        lambda x: score(x.reshape(len(points), -1), limits), np.transpose(box), init=points.T,
-        strategy=strategy, recombination=recombination, maxiter=rounds, tol=CONVERGED, rng=seed, polish=False,
-        vectorized=True, updating="deferred", callback=after,
-    )  # fmt: skip
+        lambda x: score(x.reshape(len(points), -1), limits),
+        np.transpose(box),
+        init=points.T,
+        strategy=strategy,
+        recombination=recombination,
+        maxiter=rounds,
+        tol=CONVERGED,
+        rng=seed,
+        polish=False,
+        vectorized=True,
+        updating="deferred",
+        callback=after,
+    )
     return Points.of([(done.population.T, done.population_energies)])
 
 
@@ -179,18 +208,26 @@ def simplex(score: Score, box: tuple[Real, Real], found: Points) -> Points:
     step = 0.005 * (high - low)
     edges = np.diag(np.where(start + step > high, -step, step))
     options = {
-        "initial_simplex": [start, *(start + edges)], "maxfev": 100 * start.size, "adaptive": start.size > 1,
-        "xatol": CONVERGED * (high - low).max(), "fatol": CONVERGED * abs(limit[0]),
-    }  # fmt: skip
+        "initial_simplex": [start, *(start + edges)],
+        "maxfev": 100 * start.size,
+        "adaptive": start.size > 1,
+        "xatol": CONVERGED * (high - low).max(),
+        "fatol": CONVERGED * abs(limit[0]),
+    }
     done = cast("Any", minimize)(
-        lambda x: score(x[:, None], limit)[0], start, method="Nelder-Mead", bounds=np.transpose(box), options=options
+        lambda x: score(x[:, None], limit)[0],
+        start,
+        method="Nelder-Mead",
+        bounds=np.transpose(box),
+        options=options,
     )
     return Points(done.x[:, None], np.array([done.fun]))
 
 
 def sobol(low: Real, high: Real, number: int, seed: int) -> Real:
     """Points (n, number) of Sobol's sequence in a box, scrambled by a seed; a power of two has no gap."""
-    from scipy.stats import qmc  # here, because it takes half a second to load
+    # here, because it takes half a second to load
+    from scipy.stats import qmc
 
     return (low + qmc.Sobol(low.size, rng=seed).random(number) * (high - low)).T
 

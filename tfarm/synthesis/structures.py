@@ -31,11 +31,15 @@ from tfarm.spectrum.table import first_frequency
 
 Bounds = tuple[float, float]
 
-Ends = list[tuple[int, int]]  # of bounds: the place of a coefficient, and its lower (0) or upper end (1)
+# of bounds: the place of a coefficient, and its lower (0) or upper end (1)
+Ends = list[tuple[int, int]]
 
-INTEGRAL_SPEED = 0.1  # lower limit of Ki, in Kp sqrt(Kp/J); the search starts at twice as much
-LOGARITHMIC = 1e-8  # of the usual size: the unit of a positive coefficient
-REACH = np.exp(4.0)  # of a coefficient's usual size, up and down: its first bounds
+# lower limit of Ki, in Kp sqrt(Kp/J); the search starts at twice as much
+INTEGRAL_SPEED = 0.1
+# of the usual size: the unit of a positive coefficient
+LOGARITHMIC = 1e-8
+# of a coefficient's usual size, up and down: its first bounds
+REACH = np.exp(4.0)
 
 
 class Entry(NamedTuple):
@@ -58,7 +62,9 @@ class Coefficient(NamedTuple):
 
 def positive_coefficient(name: str, start: float, most: float = np.inf, reach: float = REACH) -> Coefficient:
     """A coefficient above 0, at most `most`, of the usual size `start`."""
-    return Coefficient(name, LOGARITHMIC * start, (start / reach, min(start * reach, most)), (0.0, most), start)
+    return Coefficient(
+        name, LOGARITHMIC * start, (start / reach, min(start * reach, most)), (0.0, most), start
+    )
 
 
 def signed_coefficient(name: str, size: float) -> Coefficient:
@@ -93,7 +99,9 @@ class Structure:
     @property
     def signals(self) -> tuple[str, ...]:
         """The signals of the law."""
-        return tuple(dict.fromkeys(each.signal for each in self.entries(self.coefficients(self.origin[:, None]))))
+        return tuple(
+            dict.fromkeys(each.signal for each in self.entries(self.coefficients(self.origin[:, None])))
+        )
 
     @property
     def units(self) -> Real:
@@ -126,7 +134,9 @@ class Structure:
         if self.name == TWO_GAINS:
             return HubFeedback(**self.fixed, **dict(zip(self.names, c.tolist(), strict=True)))
         entries = self.entries(c[:, None])
-        blocks = {each.signal: (tuple(each.num[:, 0].tolist()), tuple(each.den[:, 0].tolist())) for each in entries}
+        blocks = {
+            each.signal: (tuple(each.num[:, 0].tolist()), tuple(each.den[:, 0].tolist())) for each in entries
+        }
         return Law(blocks, name=self.name, references=tuple(blocks))
 
     def at_ends(self, x: Real) -> Ends:
@@ -202,7 +212,8 @@ def polynomial_of(*coefficients: Any) -> Real:
 
 
 ONE = np.ones((1, 1))
-Built = tuple[Sequence[Coefficient], Callable[[Real], tuple[Entry, ...]]]  # free coefficients, and their entries
+# free coefficients, and their entries
+Built = tuple[Sequence[Coefficient], Callable[[Real], tuple[Entry, ...]]]
 
 
 class Declaration(NamedTuple):
@@ -276,7 +287,9 @@ def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     def entries(c: Real) -> tuple[Entry, ...]:
         K1, pole, w, a, b = c
         num = multiply_polynomials(polynomial_of(K1 + Kp / pole, Kp), _second_order(w, a))
-        return (Entry("hub_angle", num, multiply_polynomials(polynomial_of(1 / pole, 1.0), _second_order(w, b))),)
+        return (
+            Entry("hub_angle", num, multiply_polynomials(polynomial_of(1 / pole, 1.0), _second_order(w, b))),
+        )
 
     free = (
         _rate_gain(arm, Kp),
@@ -328,7 +341,8 @@ def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Built:
             den = multiply_polynomials(den, own)
         return (*_servo(Kp, c[0]), Entry("root_moment", num, den))
 
-    reach = np.exp(2.0)  # of frequency and damping of a filter
+    # of frequency and damping of a filter
+    reach = np.exp(2.0)
     free = [_rate_gain(arm, Kp)]
     for n, w in enumerate(natural_modes(arm, modes).natural_frequency[-modes:].tolist(), 1):
         free += [

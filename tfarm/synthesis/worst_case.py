@@ -23,13 +23,15 @@ from tfarm.records import frozen
 from tfarm.synthesis.structures import Bounds
 
 _Robust = TypeVar("_Robust")
-Effort = Literal["whole", "near", "sketch"]  # of a search: all runs; one run, and all that follows; one run
-Tell = Callable[[str], None]  # is called with one line of progress
+# of a search: all runs; one run, and all that follows; one run
+Effort = Literal["whole", "near", "sketch"]
+# is called with one line of progress
+Tell = Callable[[str], None]
 
-MOST_RANGES = 4  # 16 corners: a search takes 16 times as long
-MOST_ARMS = 8  # of a list, for the same reason
-ARMS_TRIED = 24  # arms at random inside the box
-MUCH_WORSE = 0.01  # of a score: an arm inside is added if it is worse by more
+# arms at random inside the box
+ARMS_TRIED = 24
+# of a score: an arm inside is added if it is worse by more
+MUCH_WORSE = 0.01
 
 
 class NamedArm(NamedTuple):
@@ -63,9 +65,14 @@ class ArmBox:
     ranges: dict[str, Bounds]
 
     def __post_init__(self) -> None:
+        # 16 corners: a search takes 16 times as long
+        most_ranges = 4
         count = len(self.ranges)
         require(
-            count <= MOST_RANGES, "range", count, f"at most {MOST_RANGES} ranges, which have {2**MOST_RANGES} corners"
+            count <= most_ranges,
+            "range",
+            count,
+            f"at most {most_ranges} ranges, which have {2**most_ranges} corners",
         )
         for key, ends in self.ranges.items():
             is_range = -math.inf < ends[0] < ends[1] < math.inf
@@ -75,7 +82,9 @@ class ArmBox:
     @property
     def corners(self) -> list[NamedArm]:
         """The arms at both ends of every range."""
-        return [self.at(np.array(shares)) for shares in itertools.product((0.0, 1.0), repeat=len(self.ranges))]
+        return [
+            self.at(np.array(shares)) for shares in itertools.product((0.0, 1.0), repeat=len(self.ranges))
+        ]
 
     def at(self, shares: Real) -> NamedArm:
         """The arm at these shares (n,) of the ranges, 0 to 1; of logarithms where the ends are far apart."""
@@ -119,7 +128,9 @@ def worst_inside(box: ArmBox, badness: Callable[[Arm], float]) -> tuple[NamedArm
 
 def arms_of(arm: Arm, also: Sequence[Arm], box: ArmBox | None) -> list[NamedArm]:
     """The arm, those of the list, and the corners of the box.  Raises ParameterError for too many in the list."""
-    require(len(also) <= MOST_ARMS, "also", len(also), f"at most {MOST_ARMS} further arms")
+    # of a list, for the same reason
+    most_arms = 8
+    require(len(also) <= most_arms, "also", len(also), f"at most {most_arms} further arms")
     corners = [] if box is None else [each for each in box.corners if each.arm != arm]
     return [*(NamedArm(each.name, each, {}) for each in (arm, *also)), *corners]
 
@@ -147,9 +158,12 @@ class WorstCase(NamedTuple):
 
 
 def for_the_worst(
-    arms: Sequence[NamedArm], box: ArmBox | None, find: Callable[[Sequence[NamedArm], _Robust | None, Effort], _Robust],
-    score_on: Callable[[_Robust, Arm], float], tell: Tell,
-) -> tuple[_Robust, list[NamedArm], WorstCase]:  # fmt: skip
+    arms: Sequence[NamedArm],
+    box: ArmBox | None,
+    find: Callable[[Sequence[NamedArm], _Robust | None, Effort], _Robust],
+    score_on: Callable[[_Robust, Arm], float],
+    tell: Tell,
+) -> tuple[_Robust, list[NamedArm], WorstCase]:
     """Return the result of `find` for the arms and for worse ones inside the box, with all of these arms.
 
     The first worse arms are those of sketches, so that the whole search already has them.  `find` is given the arms,
@@ -187,5 +201,7 @@ def same_input(arms: Sequence[NamedArm]) -> None:
     """Raise ParameterError for arms with different inputs."""
     first = arms[0].arm.input
     for each in arms:
-        remedy = f"the input of {each.name} is {each.arm.input}, that of {arms[0].name} {first}: one law has one"
+        remedy = (
+            f"the input of {each.name} is {each.arm.input}, that of {arms[0].name} {first}: one law has one"
+        )
         require(each.arm.input == first, "also", each.name, remedy)

@@ -72,7 +72,9 @@ def best_constant(trial: Trial) -> BestConstant:
         gains = np.linspace(low, high, number + 2).tolist()
         for i in np.argsort([cost(K) for K in gains[1:-1]])[:3]:
             # the cost is flat at its minimum
-            done = minimize_scalar(cost, bounds=(gains[i], gains[i + 2]), method="bounded", options={"xatol": 1e-9})
+            done = minimize_scalar(
+                cost, bounds=(gains[i], gains[i + 2]), method="bounded", options={"xatol": 1e-9}
+            )
             found.append(BestConstant(float(done.x), float(done.fun)))
     return min(found, key=lambda each: each.cost)
 
@@ -151,7 +153,9 @@ def shaper(loop: Sampled, kind: Shaper, modes: int = 2) -> Real:
 def shape_scenario(task: Scenario, impulses: Real) -> Scenario:
     """The scenario with every reference passed through the impulses; its slew ends later by their length."""
     names = ("feedforward", "hub_angle", "hub_rate", "rigid_moment")
-    through: dict[str, Any] = {name: np.convolve(getattr(task, name), impulses)[: task.t.size] for name in names}
+    through: dict[str, Any] = {
+        name: np.convolve(getattr(task, name), impulses)[: task.t.size] for name in names
+    }
     return replace(task, busy_until=task.busy_until + (impulses.size - 1) * task.period, **through)
 
 
@@ -170,9 +174,12 @@ class Outcome(NamedTuple):
     `tip_error` [m] is the distance of the tip from its target at the end; None of an unstable loop, and of the bound.
     """
 
-    cost: Annotated[float, Quantity("cost", help="T sum of (a x^2 + b e^2)/2 over the slew; infinite if unstable")]
+    cost: Annotated[
+        float, Quantity("cost", help="T sum of (a x^2 + b e^2)/2 over the slew; infinite if unstable")
+    ]
     residual: Annotated[
-        float | None, Quantity("residual root moment", "N m rms", help="after the slew, less that of a rigid arm")
+        float | None,
+        Quantity("residual root moment", "N m rms", help="after the slew, less that of a rigid arm"),
     ]
     tip_error: Annotated[float | None, Quantity(help="tip error at the end [m]")]
 
@@ -195,16 +202,26 @@ class Outcomes:
     best_constant: Annotated[
         Outcome, Quantity("constant", digits=4, help="best constant gain of the training condition")
     ]
-    own_constant: Annotated[Outcome, Quantity("own constant", digits=4, help="best constant gain of this condition")]
+    own_constant: Annotated[
+        Outcome, Quantity("own constant", digits=4, help="best constant gain of this condition")
+    ]
     own_gain: Annotated[float, Quantity(help="best constant moment gain of this condition")]
-    ZV: Annotated[Outcome, Quantity("ZV", digits=4, help="zero-vibration input shaper, without moment feedback")]
-    EI: Annotated[Outcome, Quantity("EI", digits=4, help="extra-insensitive input shaper, without moment feedback")]
+    ZV: Annotated[
+        Outcome, Quantity("ZV", digits=4, help="zero-vibration input shaper, without moment feedback")
+    ]
+    EI: Annotated[
+        Outcome, Quantity("EI", digits=4, help="extra-insensitive input shaper, without moment feedback")
+    ]
     tuner: Annotated[Outcome, Quantity("tuner", digits=4, help="trained network")]
     bound: Annotated[
         Outcome,
-        Quantity("LQ bound", digits=4, help="linear-quadratic optimum with full state and preview: a lower bound"),
+        Quantity(
+            "LQ bound", digits=4, help="linear-quadratic optimum with full state and preview: a lower bound"
+        ),
     ]
-    proven: Annotated[bool, Quantity("guard certified", help="whether the guard of the training is certified here too")]
+    proven: Annotated[
+        bool, Quantity("guard certified", help="whether the guard of the training is certified here too")
+    ]
 
 
 class NamedLoop(NamedTuple):
@@ -244,7 +261,9 @@ def tried_loops(case: Case, quantised: Chain | None = None) -> list[NamedLoop]:
     sampling = replace(case.chain.sampling, delay_samples=delay + 1)
     late = f"one {'more ' * bool(delay)}sample of delay"
     # shares of the payload, or of the arm's mass: 0.1, 0.25 and 0.5 kg on the paper's
-    mass, masses = (arm.payload_mass, (0.5, 1.5, 2.0)) if arm.payload_mass else (arm.own_mass, (0.06, 0.15, 0.3))
+    mass, masses = (
+        (arm.payload_mass, (0.5, 1.5, 2.0)) if arm.payload_mass else (arm.own_mass, (0.06, 0.15, 0.3))
+    )
     payloads = [float(f"{share * mass:.2g}") for share in masses]
     # by damping ratios of mode 1: 1e-5 and 1e-3 s on the paper's
     dampings = [float(f"{2 * zeta / first_frequency(arm):.1g}") for zeta in (3.575e-4, 3.575e-2)]
@@ -310,4 +329,6 @@ def _constant(trial: Trial, K: float) -> Outcome:
 
 def _outcome(run: Simulation, trial: Trial) -> Outcome:
     """The outcome of a simulation, by the cost of a trial."""
-    return Outcome(record_of_simulation(run, trial.cost, trial.signals).cost, run.residual_moment, tip_off(run, trial))
+    return Outcome(
+        record_of_simulation(run, trial.cost, trial.signals).cost, run.residual_moment, tip_off(run, trial)
+    )

@@ -56,7 +56,8 @@ from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.tuner.kernel import CONSUMER, Limits
 
-RADIUS_SHARE = 0.99  # of the radius that the criterion allows: room for the modes left out, and for a strict proof
+# of the radius that the criterion allows: room for the modes left out, and for a strict proof
+RADIUS_SHARE = 0.99
 
 
 @frozen
@@ -114,7 +115,9 @@ def common_lyapunov(middle: Real, drive: Real, sense: Real, low: Real, high: Rea
             P = solve_discrete_are(A, b, c.T @ c + slack * (c @ c.T).item() * np.eye(len(A)), -np.eye(1))
             P = (P + P.T) / 2 / scale / scale[:, None]
             L = np.linalg.cholesky(P)
-            rho = max(np.linalg.norm(solve_triangular(L, (L.T @ each).T, lower=True), 2) for each in (low, high))
+            rho = max(
+                np.linalg.norm(solve_triangular(L, (L.T @ each).T, lower=True), 2) for each in (low, high)
+            )
             found.append(CommonLyapunov(low, high, P, float(rho)))
     best = min(found, key=lambda each: each.contraction, default=None)
     return best if best and best.contraction < 1 else None
@@ -140,7 +143,9 @@ class MovingGain:
     def sense(self) -> Real:
         """(n,): the row of the moment."""
         # of the torque: its drive is 1
-        return np.asarray(self._fed_back[self.loop.pulse.integrals_at + 2 - len(self.loop.matrix()) + len(self.open)])
+        return np.asarray(
+            self._fed_back[self.loop.pulse.integrals_at + 2 - len(self.loop.matrix()) + len(self.open)]
+        )
 
     @cached_property
     def drive(self) -> Real:
@@ -163,7 +168,11 @@ class MovingGain:
         """The Lyapunov function of [lo, hi], proven in exact arithmetic; None where there is none."""
         half = (hi - lo) / 2
         found = common_lyapunov(
-            self.at((lo + hi) / 2), np.sqrt(half) * self.drive, np.sqrt(half) * self.sense, self.at(lo), self.at(hi)
+            self.at((lo + hi) / 2),
+            np.sqrt(half) * self.drive,
+            np.sqrt(half) * self.sense,
+            self.at(lo),
+            self.at(hi),
         )
         return found if found is not None and found.is_proven() else None
 
@@ -183,7 +192,8 @@ def _peak(residues: NDArray[np.complexfloating], poles: NDArray[np.complexfloati
 
 
 GuardKind = Literal["time-varying", "frozen", "none"]
-NARROWEST_SECTOR = 1e-4  # a sector this narrow is none
+# a sector this narrow is none
+NARROWEST_SECTOR = 1e-4
 
 
 @frozen
@@ -194,9 +204,13 @@ class Guard:
     model.  `omitted` names the keys of the chain that it does not cover.
     """
 
-    kind: Annotated[GuardKind, Quantity("kind", help="time-varying (certified), frozen (constant gains) or none")]
+    kind: Annotated[
+        GuardKind, Quantity("kind", help="time-varying (certified), frozen (constant gains) or none")
+    ]
     lo: Annotated[float, Quantity("least moment gain", digits=4, help="lower end of the guard")]
-    hi: Annotated[float, Quantity("largest moment gain", digits=4, help="upper end of the guard; infinite without one")]
+    hi: Annotated[
+        float, Quantity("largest moment gain", digits=4, help="upper end of the guard; infinite without one")
+    ]
     modes_used: Annotated[
         int, Quantity("flexible modes", key="modes", help="modes of the largest model of the certificate")
     ]
@@ -230,7 +244,9 @@ class Guard:
         """The certificate, in words."""
         if self.kind == "none":
             return "no guard: K >= 0, not certified"
-        modes = f"{self.modes_used} modes, {'more change nothing' if self.is_settled else 'more may change it'}"
+        modes = (
+            f"{self.modes_used} modes, {'more change nothing' if self.is_settled else 'more may change it'}"
+        )
         interval = f"[{self.lo:.4g}, {self.hi:.4g}]"
         if self.kind == "frozen":
             return f"{interval}: stable for every constant K, not certified for one that varies ({modes}){self.omitted}"
@@ -247,12 +263,16 @@ def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
     must_be_known("guard", kind, get_args(GuardKind))
     if kind == "none":
         return Guard("none", 0.0, math.inf, loop.plant.count, False)
-    find, sector = (_frozen, "constant gain") if kind == "frozen" else (_moving, "sector of time-varying gains")
+    find, sector = (
+        (_frozen, "constant gain") if kind == "frozen" else (_moving, "sector of time-varying gains")
+    )
     if guard := find(_larger(loop), best_constant):
         return guard
     arm = loop.plant.arm
     gains = loop.gains
-    at = ", ".join(f"{name} = {gains[name]:g}" for name in (RATE_GAIN, ANGLE_GAIN) if name == RATE_GAIN or gains[name])
+    at = ", ".join(
+        f"{name} = {gains[name]:g}" for name in (RATE_GAIN, ANGLE_GAIN) if name == RATE_GAIN or gains[name]
+    )
     start = f"{arm.name}: no {sector} is certified stable at {at}, C = {arm.damping:g} s"
     # the least damping with a guard, of a few [s]
     for C in filter(arm.damping.__lt__, np.geomspace(1e-12, 1e-2, 11).tolist()):
@@ -276,7 +296,8 @@ def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
         if not windows:
             return None
         found.append(
-            interval_around(windows, best_constant) or min(windows, key=lambda w: abs(sum(w) / 2 - best_constant))
+            interval_around(windows, best_constant)
+            or min(windows, key=lambda w: abs(sum(w) / 2 - best_constant))
         )
     low = max(low for low, _ in found)
     high = min(high for _, high in found)
@@ -329,7 +350,9 @@ def _middle(model: MovingGain, best_constant: float) -> float | None:
     """The middle gain of the default rule; None where no gain is stable."""
     # the best constant gain is within this share of half the width of the sector
     inside = 0.8
-    middles = [float(m) for low, high in constant_windows(model.loop) for m in np.linspace(low, high, 62)[1:-1]]
+    middles = [
+        float(m) for low, high in constant_windows(model.loop) for m in np.linspace(low, high, 62)[1:-1]
+    ]
     radii = np.array([model.radius(m) for m in middles])
     if not (radii > NARROWEST_SECTOR).any():
         return None

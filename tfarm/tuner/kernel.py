@@ -28,11 +28,20 @@ from tfarm.records import frozen
 CONSUMER = Consumer(
     "tune",
     acts=("reference", "anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
-    partly=("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit", "arithmetic"),
+    partly=(
+        "encoder",
+        "amplifier steps",
+        "amplifier range",
+        "DAC steps",
+        "DAC range",
+        "torque limit",
+        "arithmetic",
+    ),
     none=("volts",),
 )
 
-U_NOW, U_BEFORE, E_BEFORE, E_TWO_BEFORE, X_NOW, X_BEFORE, K_BEFORE = range(7)  # the inputs; the last is optional
+# the inputs; the last is optional
+U_NOW, U_BEFORE, E_BEFORE, E_TWO_BEFORE, X_NOW, X_BEFORE, K_BEFORE = range(7)
 
 
 class Limits(NamedTuple):
@@ -48,12 +57,18 @@ class TrialModel(NamedTuple):
     `own`.s is the arm's own root moment, before the anti-alias filter.
     """
 
-    turned: Real  # A^T (n, n)
-    A: Real  # (n, n)
-    B: Real  # (n,)
-    servo: Real  # (n,)
-    moment: Real  # (n,)
-    own: Real  # (n,)
+    # A^T (n, n)
+    turned: Real
+    # (n, n)
+    A: Real
+    # (n,)
+    B: Real
+    # (n,)
+    servo: Real
+    # (n,)
+    moment: Real
+    # (n,)
+    own: Real
 
 
 class Reference(NamedTuple):
@@ -151,7 +166,9 @@ def network_gain(weights: Real, inputs: Real, hidden: Real, limits: Limits) -> t
 
 
 @compiled
-def gain_gradient(weights: Real, inputs: Real, hidden: Real, by_sum: float, out: Real, by_input: Real) -> None:
+def gain_gradient(
+    weights: Real, inputs: Real, hidden: Real, by_sum: float, out: Real, by_input: Real
+) -> None:
     """Add by_sum times the derivative of the output neuron's sum by every weight to `out`; set that by each input."""
     m = inputs.size
     h = hidden.size
@@ -295,11 +312,13 @@ def sample_gradient(
     gain_gradient(weights, run.inputs[k], run.hidden[k], by_gain * run.slope[k], out, by_input)
 
 
-MOST_HIDDEN = 1000  # neurons; the paper has 6
+# neurons; the paper has 6
+MOST_HIDDEN = 1000
 # of the paper's network; one input more, the gain before, is optional
 PAPER_INPUTS = 6
 PAPER_HIDDEN = 6
-HALF_WIDTH = 0.5  # of the uniform distribution of the initial weights
+# of the uniform distribution of the initial weights
+HALF_WIDTH = 0.5
 
 
 @frozen
@@ -316,7 +335,9 @@ class Network:
     def __post_init__(self) -> None:
         for name in ("W1", "w2", "scales"):
             value = np.array(getattr(self, name), dtype=float)
-            require(np.isfinite(value).all(), name, value.tolist(), "every weight and scale is a finite number")
+            require(
+                np.isfinite(value).all(), name, value.tolist(), "every weight and scale is a finite number"
+            )
             object.__setattr__(self, name, value)
         remedy = f"W1 is (hidden, 6 or 7), hidden from 1 to {MOST_HIDDEN}, with as many columns as scales"
         hidden, *inputs = self.W1.shape

@@ -46,9 +46,12 @@ from tfarm.tuner.trial import Record, Trial
 # instead of the sample where a trial was stopped: none was, or x was small enough
 NEVER = -1
 ENOUGH = -2
-X, U, E, K = range(4)  # rows of the derivatives that `derive` carries, of the signals now
-BEFORE = 4  # rows further are those of the sample before, and as many further again those of the one before that
-INPUT_ROWS = (U, U + BEFORE, E + BEFORE, E + 2 * BEFORE, X, X + BEFORE, K + BEFORE)  # of each input of the network
+# rows of the derivatives that `derive` carries, of the signals now
+X, U, E, K = range(4)
+# rows further are those of the sample before, and as many further again those of the one before that
+BEFORE = 4
+# of each input of the network
+INPUT_ROWS = (U, U + BEFORE, E + BEFORE, E + 2 * BEFORE, X, X + BEFORE, K + BEFORE)
 
 
 class DescentSettings(NamedTuple):
@@ -139,7 +142,14 @@ def learn_by_trials(
 
 @inlined
 def derive(
-    k: int, setting: Setting, weights: Real, run: TrialSignals, work: SampleBuffers, S: Real, spare: Real, D: Real
+    k: int,
+    setting: Setting,
+    weights: Real,
+    run: TrialSignals,
+    work: SampleBuffers,
+    S: Real,
+    spare: Real,
+    D: Real,
 ) -> None:
     """Set derivatives at sample k by every weight, forward: rows of D are those of x, u, e, K now and 1, 2 samples ago.
 
@@ -218,7 +228,8 @@ def learn_by_samples(
                     gradient[p] = numbers.a * run.x[k] * D[X, p] + numbers.b * run.e[k] * D[E, p]
                 _step(weights, change, gradient, steps, 1.0)
                 continue
-            made = past[k % numbers.lag]  # the weights of the torque that x follows now
+            # the weights of the torque that x follows now
+            made = past[k % numbers.lag]
             if k >= numbers.lag:
                 sample_gradient(k - numbers.lag, numbers, run.x[k], run, made, gradient, work.by_input)
                 _step(weights, change, gradient, steps, 1.0)
@@ -234,7 +245,8 @@ Mode = Literal["trial", "online"]
 Rule = Literal["dynamic", "clipped", "plain"]
 Sensitivity = Literal["one-step", "whole"]
 
-QUARTILES = (0.25, 0.5, 0.75)  # of learning curves over the seeds
+# of learning curves over the seeds
+QUARTILES = (0.25, 0.5, 0.75)
 MOMENTUM = "the momentum factor lies in [0, 1)"
 
 
@@ -271,7 +283,9 @@ class Stopped:
 
     def __str__(self) -> str:
         where = f"trial {self.trial + 1} at sample {self.sample}"
-        return f"diverged in {where}: the root moment passed {self.bound:.4g} N m, the end of small deflections"
+        return (
+            f"diverged in {where}: the root moment passed {self.bound:.4g} N m, the end of small deflections"
+        )
 
 
 @frozen
@@ -303,10 +317,15 @@ class LearningCurves:
 
     costs: Real
     final: Annotated[
-        Real, Quantity(key="final_cost", help="cost with the trained network of each seed; infinite if diverged")
+        Real,
+        Quantity(key="final_cost", help="cost with the trained network of each seed; infinite if diverged"),
     ]
-    diverged: Annotated[int, Quantity("seeds diverged", key="diverged", help="trainings with an unstable trial")]
-    died: Annotated[int, Quantity("seeds died at K = 0", key="died", help="trainings whose gain went to zero")]
+    diverged: Annotated[
+        int, Quantity("seeds diverged", key="diverged", help="trainings with an unstable trial")
+    ]
+    died: Annotated[
+        int, Quantity("seeds died at K = 0", key="died", help="trainings whose gain went to zero")
+    ]
 
     @property
     def seeds(self) -> Annotated[int, Quantity("seeds", help="trainings from different initial weights")]:
@@ -317,7 +336,8 @@ class LearningCurves:
     def final_quartiles(
         self,
     ) -> Annotated[
-        list[float], Quantity("final cost, quartiles and median", digits=4, help="over the seeds: 25 %, 50 % and 75 %")
+        list[float],
+        Quantity("final cost, quartiles and median", digits=4, help="over the seeds: 25 %, 50 % and 75 %"),
     ]:
         """Lower quartile, median and upper quartile of the final costs; always some of the costs."""
         return np.quantile(self.final, QUARTILES, method="nearest").tolist()
@@ -350,4 +370,6 @@ def train(trial: Trial, network: Network, guard: Guard, learning: Learning, tria
         made, sample = learn_by_samples(*common, learning.sensitivity == "whole")
     learnt = network.with_weights(weights)
     stopped = Stopped(made - 1, int(sample), trial.numbers.bound) if sample >= 0 else None
-    return Training(learnt, guard, costs[:made], trial.with_network(learnt, guard.limits), stopped, sample == ENOUGH)
+    return Training(
+        learnt, guard, costs[:made], trial.with_network(learnt, guard.limits), stopped, sample == ENOUGH
+    )

@@ -48,7 +48,8 @@ from tfarm.tuner import kernel
 from tfarm.tuner.guard import GuardKind
 from tfarm.tuner.kernel import CONSUMER, PAPER_INPUTS, Limits, Network
 
-TRIAL_MODES = 6  # flexible modes of a trial, by default
+# flexible modes of a trial, by default
+TRIAL_MODES = 6
 ANGLE_REMEDY = "the hub angle gain is zero or positive, in N m/rad"
 
 
@@ -118,7 +119,9 @@ class Trial:
         moment = -loop.times(0.0).having("K2", 1.0).matrix()[last]
         own = loop.rig.sensed.own_moment(loop.chain.sampling)
         own = np.pad(own, (0, drive.size - own.size))
-        return kernel.TrialModel(*(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment, own)))
+        return kernel.TrialModel(
+            *(np.ascontiguousarray(each) for each in (A.T, A, drive, servo, moment, own))
+        )
 
     @cached_property
     def reference(self) -> kernel.Reference:
@@ -174,7 +177,9 @@ class Trial:
         done = int(kernel.forward(self.setting(network, guard), network.weights, run, work))
         is_whole = done == self.n
         cost = float(kernel.trial_cost(done, self.numbers, run)) if is_whole else math.inf
-        t, x, u, e, K, moment = (each[:done] for each in (self.task.t, run.x, run.u, run.e, run.K, run.moment))
+        t, x, u, e, K, moment = (
+            each[:done] for each in (self.task.t, run.x, run.u, run.e, run.K, run.moment)
+        )
         return Record(t, x, u, e, K, moment, cost, None if is_whole else done)
 
     def with_constant(self, K: float) -> Record:
@@ -306,7 +311,8 @@ class SavedTuner(StrictTable):
     arm: Annotated[str, Field(max_length=80)]
     period: Annotated[Finite, Field(gt=0)]
     K1: Finite
-    Kp: Annotated[Finite, Field(ge=0)] = 0.0  # absent in files of tuners without a servo
+    # absent in files of tuners without a servo
+    Kp: Annotated[Finite, Field(ge=0)] = 0.0
     signals: MomentReading
     a: Finite
     b: Finite
@@ -327,7 +333,9 @@ class SavedTuner(StrictTable):
     def gain(self) -> TunedGain:
         """The controller.  Raises ParameterError where the parts of the tuner do not match."""
         is_free = self.guard_kind == "none"
-        require((self.guard is None) == is_free, "guard", self.guard, "two ends, or null with guard_kind none")
+        require(
+            (self.guard is None) == is_free, "guard", self.guard, "two ends, or null with guard_kind none"
+        )
         limits = Limits(*(self.guard or (0.0, math.inf)))
         require(0 <= limits.lo < limits.hi, "guard", self.guard, "its lower end, from 0 on, comes first")
         return TunedGain(self.network, limits, HubFeedback(K1=self.K1, Kp=self.Kp), self.signals)
@@ -335,7 +343,10 @@ class SavedTuner(StrictTable):
 
 def to_text(tuner: SavedTuner) -> str:
     """Text of a tuner's file; equal tuners give equal text, and it loads to the same bits."""
-    return json.dumps(tuner.model_dump(exclude_defaults=True), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    return (
+        json.dumps(tuner.model_dump(exclude_defaults=True), indent=1, allow_nan=False, ensure_ascii=False)
+        + "\n"
+    )
 
 
 def save_tuner(tuner: SavedTuner, path: Path) -> None:
@@ -347,8 +358,11 @@ def load_tuner(path: str | os.PathLike[str], key: str = "controller") -> SavedTu
     """Read the tuner of a file.  Raises ParameterError, in one line, for the first problem of the file."""
     # more bytes than a network of the most neurons takes
     most = 4_000_000
-    found = validated_file(SavedTuner, path, most, key=key, what="a tuner's file of tfarm tune ARM --save FILE.json")
+    found = validated_file(
+        SavedTuner, path, most, key=key, what="a tuner's file of tfarm tune ARM --save FILE.json"
+    )
     with name_file(path):
-        found.gain()  # refuses parts that do not match
+        # refuses parts that do not match
+        found.gain()
         Cost(a=found.a, b=found.b)
     return found

@@ -40,8 +40,14 @@ from tfarm.tuner.trial import (
 )
 
 NUMBERS: dict[str, Callable[[float], float]] = {  # of a plan, by which studies may vary it
-    "trials": int, "seed": int, "K1": float, "Kp": float, "duration": float, "hidden": int, "scale": float,
-}  # fmt: skip
+    "trials": int,
+    "seed": int,
+    "K1": float,
+    "Kp": float,
+    "duration": float,
+    "hidden": int,
+    "scale": float,
+}
 NUMBERS_OF_LEARNING = ("eta", "alpha", "clip", "enough")
 
 
@@ -74,14 +80,22 @@ class Plan:
     def trial(self, arm: Arm, chain: Chain | None) -> Trial:
         """The trial on an arm, with the weights of the cost on moments and torques in units of the scale."""
         return slew_trial(
-            arm, chain, K1=self.K1, Kp=self.Kp, signals=self.signals, duration=self.duration, count=self.count,
+            arm,
+            chain,
+            K1=self.K1,
+            Kp=self.Kp,
+            signals=self.signals,
+            duration=self.duration,
+            count=self.count,
             cost=Cost(a=self.cost.a / self.scale**2, b=self.cost.b / self.scale**2),
-        )  # fmt: skip
+        )
 
     def network(self, seed: int) -> Network:
         """The network with the first weights of a seed."""
         return initial_network(
-            seed, hidden=self.hidden, scales=np.r_[np.full(PAPER_INPUTS, self.scale), np.ones(int(self.seventh_input))]
+            seed,
+            hidden=self.hidden,
+            scales=np.r_[np.full(PAPER_INPUTS, self.scale), np.ones(int(self.seventh_input))],
         )
 
 
@@ -113,11 +127,20 @@ class Tuning:
         plan = self.plan
         network = self.training.network
         return SavedTuner(
-            format=FORMAT, arm=self.trial.arm.name, period=self.trial.task.period, K1=plan.K1, Kp=plan.Kp,
-            signals=plan.signals, a=plan.cost.a, b=plan.cost.b, guard_kind=guard.kind,
+            format=FORMAT,
+            arm=self.trial.arm.name,
+            period=self.trial.task.period,
+            K1=plan.K1,
+            Kp=plan.Kp,
+            signals=plan.signals,
+            a=plan.cost.a,
+            b=plan.cost.b,
+            guard_kind=guard.kind,
             guard=None if guard.kind == "none" else (guard.lo, guard.hi),
-            scales=network.scales.tolist(), W1=network.W1.tolist(), w2=network.w2.tolist(),
-        )  # fmt: skip
+            scales=network.scales.tolist(),
+            W1=network.W1.tolist(),
+            w2=network.w2.tolist(),
+        )
 
     def gain(self) -> TunedGain:
         """The trained controller."""
@@ -146,7 +169,12 @@ def tune(arm: Arm, plan: Plan | None = None, chain: Chain | None = None) -> Tuni
 
     Raises ParameterError for an invalid plan, arm or chain, and CertificationError where there is no guard.
     """
-    require(isinstance(plan, Plan | None), "plan", plan, "give a tfarm.tuner.Plan, such as Plan(trials=50, K1=0.3)")
+    require(
+        isinstance(plan, Plan | None),
+        "plan",
+        plan,
+        "give a tfarm.tuner.Plan, such as Plan(trials=50, K1=0.3)",
+    )
     must_be_arm(arm)
     plan = usual_plan(arm, chain) if plan is None else plan
     network = plan.network(plan.seed)
@@ -169,7 +197,12 @@ def _baselines(arm: Arm, chain: Chain | None, plan: Plan) -> tuple[Trial, Guard,
     return (
         trial,
         find_guard(trial.loop, plan.guard, best.gain),
-        {"without": trial.with_constant(0.0), "best_constant": best, "bound": lq_bound(trial), "shaped": shaped},
+        {
+            "without": trial.with_constant(0.0),
+            "best_constant": best,
+            "bound": lq_bound(trial),
+            "shaped": shaped,
+        },
     )
 
 
@@ -185,7 +218,9 @@ class Baseline(NamedTuple):
     """The cost of a slew with a baseline."""
 
     name: Annotated[str, Quantity("controller", help="tuner or baseline")]
-    cost: Annotated[float, Quantity("cost of a slew", digits=4, help="T sum of (a x^2 + b e^2)/2 over its samples")]
+    cost: Annotated[
+        float, Quantity("cost of a slew", digits=4, help="T sum of (a x^2 + b e^2)/2 over its samples")
+    ]
     later: Annotated[float | None, Quantity("arrives later", "s", 3, "delay of the shaped slew")] = None
 
 
@@ -194,18 +229,25 @@ class SlewEnd(NamedTuple):
 
     residual: Annotated[
         float | None,
-        Quantity(RESIDUAL, "N m rms", key="residual_moment_rms", help="after the slew, less that of a rigid arm"),
+        Quantity(
+            RESIDUAL, "N m rms", key="residual_moment_rms", help="after the slew, less that of a rigid arm"
+        ),
     ]
     residual_raw: Annotated[
-        float | None, Quantity(key="residual_raw_moment_rms", help="rms of the root moment after the slew [N m]")
+        float | None,
+        Quantity(key="residual_raw_moment_rms", help="rms of the root moment after the slew [N m]"),
     ]
-    residual_without: Annotated[float | None, Quantity("without moment feedback", "N m rms", help="its residual")]
+    residual_without: Annotated[
+        float | None, Quantity("without moment feedback", "N m rms", help="its residual")
+    ]
     tip_error: Annotated[float | None, Quantity("tip error at the end", "m", 3, "distance from the target")]
     tip_error_constant: Annotated[
         float | None,
         Quantity("with the best constant gain", "m", 3, "its tip error", key="tip_error_best_constant_m"),
     ]
-    tip_error_without: Annotated[float | None, Quantity("and without moment feedback", "m", 3, "its tip error")]
+    tip_error_without: Annotated[
+        float | None, Quantity("and without moment feedback", "m", 3, "its tip error")
+    ]
 
     @classmethod
     def of(cls, tuning: Tuning) -> SlewEnd:
@@ -227,7 +269,10 @@ class TuningResult:
     ] = None
     comparison: Annotated[
         list[Outcomes] | None,
-        Quantity("compared in other conditions", help="the same controllers with converters, delay and on other arms"),
+        Quantity(
+            "compared in other conditions",
+            help="the same controllers with converters, delay and on other arms",
+        ),
     ] = None
 
     @property
@@ -242,10 +287,17 @@ class TuningResult:
         """Mode, rule, constants and seed of the learning, gains of the servo, and weights of the cost."""
         plan = self.tuning.plan
         return {
-            "mode": plan.learning.mode, "rule": plan.learning.rule, "sensitivity": plan.learning.sensitivity,
-            "signals": plan.signals, "seed": plan.seed, "K1": plan.K1, "Kp": plan.Kp, "a": plan.cost.a,
-            "b": plan.cost.b, "cost_unit_N_m": plan.scale,
-        }  # fmt: skip
+            "mode": plan.learning.mode,
+            "rule": plan.learning.rule,
+            "sensitivity": plan.learning.sensitivity,
+            "signals": plan.signals,
+            "seed": plan.seed,
+            "K1": plan.K1,
+            "Kp": plan.Kp,
+            "a": plan.cost.a,
+            "b": plan.cost.b,
+            "cost_unit_N_m": plan.scale,
+        }
 
     @property
     def trials(self) -> Annotated[int, Quantity("trials", help="slews of the training")]:
@@ -288,13 +340,17 @@ class TuningResult:
             "cost_lq_bound": tuning.bound.cost,
             "lq_bound_note": bound,
             "cost_shaped": min(each.cost for each in shaped.values()),
-            "shaped": {kind: {"cost": each.cost, "arrives_later_by_s": each.later} for kind, each in shaped.items()},
+            "shaped": {
+                kind: {"cost": each.cost, "arrives_later_by_s": each.later} for kind, each in shaped.items()
+            },
             "shaped_note": "no moment feedback; cost of the shaped slew, which arrives later: cost_lq_bound is no "
             "bound of it",
         }
 
     @property
-    def gain(self) -> Annotated[dict[str, Real], Quantity(help="moment gain K at the times t of the tuned slew")]:
+    def gain(
+        self,
+    ) -> Annotated[dict[str, Real], Quantity(help="moment gain K at the times t of the tuned slew")]:
         """The moment gain over time, tuned."""
         return {"t": self.tuning.training.result.t, "K": self.tuning.training.result.K}
 
@@ -309,12 +365,16 @@ class TuningResult:
         return float(K.min()), float(K.max())
 
     @cached_property
-    def end(self) -> Annotated[SlewEnd, Quantity(flat=True, help="residual moment and tip error of the slew")]:
+    def end(
+        self,
+    ) -> Annotated[SlewEnd, Quantity(flat=True, help="residual moment and tip error of the slew")]:
         """The end of the slew, tuned and not."""
         return SlewEnd.of(self.tuning)
 
     @property
-    def guard(self) -> Annotated[Guard, Quantity("guard of the gain", help="interval that the gain cannot leave")]:
+    def guard(
+        self,
+    ) -> Annotated[Guard, Quantity("guard of the gain", help="interval that the gain cannot leave")]:
         """The interval of the tuner's gain, and its certificate."""
         return self.tuning.training.guard
 
@@ -328,13 +388,17 @@ class TuningResult:
         return self.tuning.training.reached
 
     @property
-    def stopped(self) -> Annotated[str | None, Quantity("stopped", help="trial and sample where training diverged")]:
+    def stopped(
+        self,
+    ) -> Annotated[str | None, Quantity("stopped", help="trial and sample where training diverged")]:
         """The reason of an early end of the training."""
         stopped = self.tuning.training.stopped
         return None if stopped is None else str(stopped)
 
     @property
-    def weights(self) -> Annotated[dict[str, Any], Quantity(help="weights of the network and scales of its inputs")]:
+    def weights(
+        self,
+    ) -> Annotated[dict[str, Any], Quantity(help="weights of the network and scales of its inputs")]:
         """Every weight of the network."""
         return self.tuning.saved().model_dump(include={"scales", "W1", "w2"})
 
@@ -360,8 +424,15 @@ def controlled_run(
     task = scenario(name, arm, chain, duration)
     run, used = simulate_modes(case, task, count, between, outputs, gain.run)
     trained = {
-        "trained_on": saved.arm, "guard_kind": saved.guard_kind, "guard": list(gain.guard), "K1": saved.K1,
-        "Kp": saved.Kp, "signals": saved.signals, "period_s": saved.period, "a": saved.a, "b": saved.b,
+        "trained_on": saved.arm,
+        "guard_kind": saved.guard_kind,
+        "guard": list(gain.guard),
+        "K1": saved.K1,
+        "Kp": saved.Kp,
+        "signals": saved.signals,
+        "period_s": saved.period,
+        "a": saved.a,
+        "b": saved.b,
         "cost_unit_N_m": saved.scales[0],
-    }  # fmt: skip
+    }
     return Run(case, run, used, describe_scenario(task, arm, chain), tuner=trained)
