@@ -40,7 +40,9 @@ def significant(x: float, digits: int) -> str:
     most_plain = 1e7
     if x and not least_plain <= abs(x) < most_plain:
         return scientific(x, digits)
-    return _typeset(f"{x:.{max(0, digits - 1 - _exponent(x, digits))}f}") if x else "0"
+    if x:
+        return _typeset(f"{x:.{max(0, digits - 1 - _exponent(x, digits))}f}")
+    return "0"
 
 
 def plain(x: float, digits: int = 10) -> str:
@@ -84,7 +86,9 @@ def round_to_error(value: float, error: float, most: int) -> str:
     if value == 0:
         return "0"
     digits = math.floor(math.log10(abs(value) / error))
-    return general(value, min(digits, most)) if digits > 0 else f"0 (+-{error:.0e})"
+    if digits > 0:
+        return general(value, min(digits, most))
+    return f"0 (+-{error:.0e})"
 
 
 def how_many(count: float, what: str) -> str:
@@ -94,7 +98,9 @@ def how_many(count: float, what: str) -> str:
 
 def join_words(words: Sequence[str]) -> str:
     """Return words with commas and an "and" before the last."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+    if len(words) == 1:
+        return words[0]
+    return f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def powers(text: str) -> str:

@@ -92,9 +92,10 @@ def write_file(path: Path, content: bytes, *, key: str) -> None:
             _replace(Path(os.path.realpath(path)), content)
             return
         # a pipe without a reader, and a folder, raise OSError at once
-        handle = (
-            os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0)) if number is None else os.dup(number)
-        )
+        if number is None:
+            handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
+        else:
+            handle = os.dup(number)
         os.set_blocking(handle, True)
         with os.fdopen(handle, "wb") as file:
             file.write(content)
@@ -182,7 +183,9 @@ def _descriptor(path: Path) -> int | None:
         return 1
     name = os.path.abspath(path)
     found = re.fullmatch(r"/(?:dev|proc/self)/fd/(\d{1,9})", name)
-    return int(found[1]) if found else {"/dev/stdout": 1, "/dev/stderr": 2}.get(name)
+    if found:
+        return int(found[1])
+    return {"/dev/stdout": 1, "/dev/stderr": 2}.get(name)
 
 
 def _replace(path: Path, content: bytes) -> None:

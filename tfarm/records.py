@@ -69,7 +69,9 @@ def frozen(
 @dataclass_transform(frozen_default=True)
 def frozen(cls: Any = None, /, **how: bool) -> Any:
     """Decorate a class: a frozen dataclass that is a `record`."""
-    return partial(frozen, **how) if cls is None else dataclass(frozen=True, **how)(record(cls))
+    if cls is None:
+        return partial(frozen, **how)
+    return dataclass(frozen=True, **how)(record(cls))
 
 
 def read_only(value: Any) -> Any:
@@ -81,7 +83,11 @@ def read_only(value: Any) -> Any:
             value = value.view()
             value.flags.writeable = False
         return value
-    entries = value.values() if isinstance(value, dict) else value if isinstance(value, tuple | list) else ()
+    entries: Any = ()
+    if isinstance(value, dict):
+        entries = value.values()
+    elif isinstance(value, tuple | list):
+        entries = value
     if all(type(each) in PLAIN for each in entries):
         return value
     views = list(map(read_only, entries))
@@ -89,7 +95,9 @@ def read_only(value: Any) -> Any:
         return value
     if isinstance(value, dict):
         return dict(zip(value, views, strict=True))
-    return type(value)(*views) if hasattr(value, "_fields") else type(value)(views)
+    if hasattr(value, "_fields"):
+        return type(value)(*views)
+    return type(value)(views)
 
 
 def _read_only_result(function: Any) -> Any:
@@ -133,7 +141,9 @@ def _key(value: Any) -> Any:
     """Return a hashable value that is equal for equal entries."""
     if isinstance(value, tuple | list):
         return tuple(map(_key, value))
-    return None if isinstance(value, np.ndarray | dict) or value != value else value
+    if isinstance(value, np.ndarray | dict) or value != value:
+        return None
+    return value
 
 
 def _repr(self: Any) -> str:
@@ -181,7 +191,9 @@ def _shown(value: Any, longest: int = 60) -> str:
     few = 3
     if isinstance(value, np.ndarray):
         is_short = value.ndim == 1 and value.size <= few
-        return f"[{', '.join(map(_shown, value.tolist()))}]" if is_short else f"<array {value.shape}>"
+        if is_short:
+            return f"[{', '.join(map(_shown, value.tolist()))}]"
+        return f"<array {value.shape}>"
     if isinstance(value, float | complex):
         return f"{value:.6g}"
     if isinstance(value, dict):

@@ -70,7 +70,9 @@ def load_law(name_or_path: AnyFile) -> Law | None:
     """
     tables, file = load_tables(name_or_path)
     with name_file(file):
-        return law_of_table(tables["law"], Path(file).parent) if "law" in tables else None
+        if "law" in tables:
+            return law_of_table(tables["law"], Path(file).parent)
+        return None
 
 
 def law_of_table(table: Any, folder: Path) -> Law:

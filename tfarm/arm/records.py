@@ -285,7 +285,9 @@ class Arm:
         """The input for a torque of 1 N m at the hub: 1, or a motor's current [A] or voltage [V]."""
         motor = self._drive
         at_one = {"motor_current": 1.0, "motor_voltage": motor.resistance}.get(self.input)
-        return at_one / (motor.gear_efficiency * motor.gear_ratio * motor.torque_constant) if at_one else 1.0
+        if at_one:
+            return at_one / (motor.gear_efficiency * motor.gear_ratio * motor.torque_constant)
+        return 1.0
 
     @property
     def input_lags(self) -> bool:

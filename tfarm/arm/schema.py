@@ -73,9 +73,10 @@ def validate_table(model: type[_Strict], table: Any, place: str) -> _Strict:
     known = model.model_fields
     if word not in known:
         is_of_top = place and word in AT_THE_TOP
-        remedy = (
-            f"unknown key; {word} belongs at the top of the file" if is_of_top else unknown_key(word, known)
-        )
+        if is_of_top:
+            remedy = f"unknown key; {word} belongs at the top of the file"
+        else:
+            remedy = unknown_key(word, known)
         raise ParameterError(key=key, value=value, remedy=remedy)
     expected = f"a table, headed [{word}]" if word in ARM_TABLES else EXPECTED.get(known[word].annotation)
     remedy = f"give {expected}" if expected else problem["msg"]
@@ -254,7 +255,9 @@ def file_key(key: str, arm: Arm | None = None) -> Quantity:
     words = [word for word in key.partition(":")[0].split(".") if not word.isdecimal()]
     place = ["top" if words[0] in AT_THE_TOP else "sensor"] if len(words) == 1 else []
     found = file_keys()[".".join((*place, *words))]
-    return replace(found, unit=arm.input_unit) if arm is not None and found.unit == OF_INPUT else found
+    if arm is not None and found.unit == OF_INPUT:
+        return replace(found, unit=arm.input_unit)
+    return found
 
 
 def _within(name: str, place: str, table: Any) -> Any:

@@ -100,7 +100,9 @@ def _signal_table(part: Part) -> dict[str, Any]:
         )
         raise ParameterError(key="law", value=part.signals[0], remedy=remedy)
     is_gain = block.is_constant and block.den == (1.0,)
-    return {"gain": block.num[0]} if is_gain else {"num": block.num, "den": block.den}
+    if is_gain:
+        return {"gain": block.num[0]}
+    return {"num": block.num, "den": block.den}
 
 
 def toml_text(tables: Iterable[list[str]]) -> str:
@@ -126,7 +128,9 @@ def _value(value: Any) -> str:
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, list):
         return "\n".join(["[", *(f"    {_value(each)}," for each in value), "]"])
-    return f"[{', '.join(map(_value, value))}]" if isinstance(value, tuple) else repr(value)
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    return repr(value)
 
 
 class KeyedArms:

@@ -268,7 +268,9 @@ def result_card(
 
 def analysis_of(name: str, case: Case) -> Margins | Analysis:
     """Return the margins of the continuous loop of a case, or the analysis of its sampled one."""
-    return sampled_of(case.arm, case.law, case.chain) if name == "sampled" else margins_of(case.arm, case.law)
+    if name == "sampled":
+        return sampled_of(case.arm, case.law, case.chain)
+    return margins_of(case.arm, case.law)
 
 
 def loop_card(name: str, case: Case, known: Margins | Analysis | None = None) -> LoopCard:
@@ -360,7 +362,9 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
         )
 
     found = None if case.law.is_discrete else as_card("continuous")
-    return found if found is not None and chain is None else replace(as_card("sampled"), continuous=found)
+    if found is not None and chain is None:
+        return found
+    return replace(as_card("sampled"), continuous=found)
 
 
 def _least_damped(poles: Iterable[tuple[int, complex]]) -> LeastDamped | None:
@@ -404,4 +408,8 @@ def grade_of(size: float | None, limits: tuple[float, float]) -> str:
         return UNDEFINED
     sign = 1.0 if limits[0] > limits[1] else -1.0
     good, low = (sign * size >= sign * limit for limit in limits)
-    return GOOD if good else LOW if low else POOR
+    if good:
+        return GOOD
+    if low:
+        return LOW
+    return POOR

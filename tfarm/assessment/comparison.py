@@ -133,7 +133,9 @@ class ComparedSide:
     def delay_margin(self) -> float | None:
         """The smallest further delay [s] that destabilises the loop, as far as it is known."""
         in_band = self.loop.in_band
-        return None if in_band is None else self.loop.delay_margin_seconds or in_band.delay
+        if in_band is None:
+            return None
+        return self.loop.delay_margin_seconds or in_band.delay
 
     def reach(self, delay: Real) -> list[Sequence[Window]]:
         """The intervals of a factor on the law in which its loop is stable, at each further delay [s]."""
@@ -221,9 +223,9 @@ class Comparison:
         Quantity("modes of the arms", key="modes", help="flexible modes by number; none of one arm"),
     ]:
         """Natural frequencies and damping ratios of both arms, by mode; of one arm none."""
-        return (
-            compare_records(self.one.arm_modes, self.other.arm_modes, self.names) if self.is_of_arms else []
-        )
+        if self.is_of_arms:
+            return compare_records(self.one.arm_modes, self.other.arm_modes, self.names)
+        return []
 
     @property
     def pole_differences(

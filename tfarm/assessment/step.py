@@ -281,11 +281,10 @@ class _LoopRecord:
             for key, value in known.items()
         }
         spread["peak"] = (peak.most - abs(peak.value) + peak.bound) / size
-        largest = (
-            t[abs(y) + bound >= abs(peak.value) - peak.bound]
-            if peak.bound > resolved * OPEN * size
-            else t[:0]
-        )
+        if peak.bound > resolved * OPEN * size:
+            largest = t[abs(y) + bound >= abs(peak.value) - peak.bound]
+        else:
+            largest = t[:0]
         late = float(np.ptp(np.r_[peak.time, largest])) - 2 * step
         spread["peak_time"] = late / max(peak.time, self.t[-1] / 10)
         known |= {"peak": peak.value, "peak_time": peak.time}
@@ -415,7 +414,9 @@ class Step(_LoopRecord):
 
 def signal_unit(arm: Arm, name: str) -> str:
     """SI unit of a signal, or of the input as "torque"."""
-    return arm.input_unit if name == TORQUE else locate_output(name, arm.length)[0].unit
+    if name == TORQUE:
+        return arm.input_unit
+    return locate_output(name, arm.length)[0].unit
 
 
 def step(
@@ -604,4 +605,6 @@ def _spread(value: float | None, others: Sequence[float | None], floor: float) -
 def _reached(t: Real, share: Real, level: float) -> float:
     """Time [s] at which a signal first reaches a level, by a line between two records."""
     n = int((share >= level).argmax())
-    return float(np.interp(level, share[n - 1 : n + 1], t[n - 1 : n + 1])) if n else float(t[0])
+    if n:
+        return float(np.interp(level, share[n - 1 : n + 1], t[n - 1 : n + 1]))
+    return float(t[0])

@@ -128,7 +128,9 @@ class ArmProof:
         self,
     ) -> Annotated[str, Quantity("source", help="preset, where the file is that of one byte for byte")]:
         """Whether the arm's file is, byte for byte, that of a preset."""
-        return "preset" if self.name in presets() and hash_of(load(self.name)) == self.sha256 else "file"
+        if self.name in presets() and hash_of(load(self.name)) == self.sha256:
+            return "preset"
+        return "file"
 
     @property
     def leading_digits(self) -> list[str]:

@@ -141,7 +141,9 @@ def remainder(*expressions: Expression) -> str:
     if len(str(left)) > 160:
         left = [sp.factor(each) for each in left]
     text = "; ".join(str(each).replace("**", "^") for each in left)
-    return text if len(text) <= 160 else f"{text[:150]} ... ({len(text)} characters)"
+    if len(text) <= 160:
+        return text
+    return f"{text[:150]} ... ({len(text)} characters)"
 
 
 # places of a jet

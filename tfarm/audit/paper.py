@@ -236,9 +236,9 @@ def is_given(name: str, text: str) -> str:
     """Whether a parameter that (2), (3) and the a_ij need has a value of the right dimension."""
     for clause in (clause for clause in clauses(text) if clause.startswith(f"{name} = ")):
         _, value, dimension = quantity(clause)
-        return (
-            "0" if value > 0 and dimension == PAPER_UNITS[name] else f"{name} in {base_units_text(dimension)}"
-        )
+        if value > 0 and dimension == PAPER_UNITS[name]:
+            return "0"
+        return f"{name} in {base_units_text(dimension)}"
     return f"{name} has no value"
 
 

@@ -426,9 +426,10 @@ def emit_record(
         show_table(summary.table)
         show_text("\n".join(summary.notes))
         print()
-    words = (
-        f"by default {defaults['default_gains_in_words']}" if defaults and defaults["default_gains"] else ""
-    )
+    if defaults and defaults["default_gains"]:
+        words = f"by default {defaults['default_gains_in_words']}"
+    else:
+        words = ""
     show(record, rows, words)
 
 

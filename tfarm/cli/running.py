@@ -194,4 +194,6 @@ def usage(error: Any) -> str:
         near = get_close_matches(word, ours, 1, cutoff=0.8)
         if near == [word] or (near and "Did you mean" not in text):
             return f"No such command '{word}'. Did you mean \"{ours[near[0]]}\"?"
-    return text.removeprefix("Invalid value for ").replace("'", "", 2) if "param" in vars(error) else text
+    if "param" in vars(error):
+        return text.removeprefix("Invalid value for ").replace("'", "", 2)
+    return text

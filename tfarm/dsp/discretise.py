@@ -169,7 +169,9 @@ def _single_block(block: LawBlock) -> LawBlock:
     )
     require(all(np.isfinite(each).all() for each in matrices), "converters.arithmetic", "float32", remedy)
     is_gain = isinstance(block, Rational) and not block.order
-    return Rational((float(matrices[3][0, 0]),)) if is_gain else StateSpace(*matrices)
+    if is_gain:
+        return Rational((float(matrices[3][0, 0]),))
+    return StateSpace(*matrices)
 
 
 def with_estimate(law: Law, chain: Chain) -> Law:

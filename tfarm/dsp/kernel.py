@@ -303,7 +303,12 @@ def run_samples(
         known[ANGLE], known[RATE], known[MOMENT] = _converted(record, state.saturated[k], memory, electronics)
         for j in range(sources.size):
             source = sources[j]
-            value = 0.0 if source < 0 else known[source] if source < known.size else record[source]
+            if source < 0:
+                value = 0.0
+            elif source < known.size:
+                value = known[source]
+            else:
+                value = record[source]
             z[order + j] = to_precision(
                 to_precision(references[k, j], single) - to_precision(value, single), single
             )

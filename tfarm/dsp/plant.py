@@ -122,7 +122,9 @@ class Plant:
         """
         (slow,) = np.nonzero((self.poles.imag == 0) & (abs(self.poles) < slower_than))
         turns = self.rigid[:, 1].any() and not self.rigid[:, 0].any()
-        return int(slow[abs(self.poles[slow]).argmin()]) if turns and slow.size else None
+        if turns and slow.size:
+            return int(slow[abs(self.poles[slow]).argmin()])
+        return None
 
     @property
     def count(self) -> int:
@@ -224,7 +226,9 @@ class SensedPlant:
         whole = self.unfiltered
         corner = self.chain.sampling.antialias_corner
         analog = [n for n, each in enumerate(self.read.outputs) if is_analog(each, self.chain)]
-        return whole if math.isinf(corner) or not analog else with_filter(whole, analog, corner)
+        if math.isinf(corner) or not analog:
+            return whole
+        return with_filter(whole, analog, corner)
 
     @property
     def unfiltered(self) -> Plant:

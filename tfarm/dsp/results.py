@@ -258,7 +258,9 @@ class Run(OfCase):
         self,
     ) -> Annotated[dict[str, Real] | None, Quantity(help="signals at the records between two samples")]:
         """The same between the samples, of the signals that change there."""
-        return None if (between := self.simulation.between) is None else between.by_name
+        if (between := self.simulation.between) is None:
+            return None
+        return between.by_name
 
     @property
     def csv_table(self) -> Table:
@@ -322,7 +324,9 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
 
 def _left(ideal: Simulation, part: slice) -> float:
     """Half of the range of the moment of the ideal chain in a part of the record; inf where that was stopped."""
-    return math.inf if ideal.stopped else _half_range(ideal.at_samples.root_moment[part])
+    if ideal.stopped:
+        return math.inf
+    return _half_range(ideal.at_samples.root_moment[part])
 
 
 def _half_range(signal: Real) -> float:

@@ -163,9 +163,9 @@ def describe_scenario(task: Scenario, arm: Arm, chain: Chain) -> str:
 def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
     """Return the scenario of that name with its usual size.  Raises ParameterError for an unknown one."""
     must_be_known("scenario", name, SCENARIOS)
-    return (
-        slew_scenario(arm, chain, duration) if name == "slew" else rest_scenario(name, arm, chain, duration)
-    )
+    if name == "slew":
+        return slew_scenario(arm, chain, duration)
+    return rest_scenario(name, arm, chain, duration)
 
 
 def _samples(duration: float, period: float) -> int:

@@ -129,7 +129,9 @@ class Trace:
     def signal(self, name: str) -> Real:
         """Return a signal by its name.  Raises ParameterError for one that was not recorded."""
         must_be_known("output", name, self.names)
-        return self.others[name] if name in self.others else cast("Real", getattr(self, name))
+        if name in self.others:
+            return self.others[name]
+        return cast("Real", getattr(self, name))
 
     @property
     def by_name(self) -> dict[str, Real]:
@@ -256,11 +258,10 @@ class Simulation:
         end = float(self.t.max(initial=0.0))
         moment = float(abs(self.at_samples.root_moment).max(initial=0.0))
         clipped = [f"{name} clipped at {n} samples" for name, n in self.saturated.items() if n]
-        ran = (
-            f"ran to {end:.6g} s"
-            if self.stopped is None
-            else f"unstable, stopped at {self.stopped.time:.6g} s"
-        )
+        if self.stopped is None:
+            ran = f"ran to {end:.6g} s"
+        else:
+            ran = f"unstable, stopped at {self.stopped.time:.6g} s"
         return ", ".join([ran, f"root moment up to {moment:.4g} N m", *clipped])
 
     @property

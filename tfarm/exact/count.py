@@ -154,11 +154,9 @@ def list_steps(first: Any, last: int, rows: Any, starts: Any, ends: Any, estimat
 @inlined
 def half_waves(z: complex, t: complex, dt: complex) -> int:
     """Return the number of n with n pi < k, for a travelling wave e^{i k x}."""
-    return (
-        max(0, math.ceil((abs(t.imag) + math.copysign(1.0, t.imag) * dt.imag) / math.pi) - 1)
-        if z.real < 0.0
-        else 0
-    )
+    if z.real < 0.0:
+        return max(0, math.ceil((abs(t.imag) + math.copysign(1.0, t.imag) * dt.imag) / math.pi) - 1)
+    return 0
 
 
 @inlined

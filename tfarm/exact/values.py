@@ -218,7 +218,9 @@ def output_ball(k: System, wanted: Output, s: Ball, x: float) -> Ball | None:
 
 def accurate_ball(value: Ball | None, bits: int) -> Ball | None:
     """Return a ball with that many right bits, or of 0 alone; None for any other."""
-    return value if value is not None and (value.rel_accuracy_bits() >= bits or value.is_zero()) else None
+    if value is not None and (value.rel_accuracy_bits() >= bits or value.is_zero()):
+        return value
+    return None
 
 
 def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0) -> Ball:
@@ -351,11 +353,10 @@ class ByMethod:
         """The agreement of the methods in words."""
         # relative: some tens of roundings of a float64
         methods_agree = 1e-14
-        word = (
-            "agree to rounding"
-            if self.largest_difference <= methods_agree
-            else "differ by more than rounding"
-        )
+        if self.largest_difference <= methods_agree:
+            word = "agree to rounding"
+        else:
+            word = "differ by more than rounding"
         return f"{', '.join(self.values)}: {word}"
 
     def rows(self, at: Sequence[Any]) -> list[MethodRow]:
@@ -385,7 +386,9 @@ def why_no_appendix(arm: Arm, theory: Theory, wanted: Sequence[Output] = ()) -> 
     if theory != "timoshenko" or not arm.is_uniform:
         return "the paper's appendix is of one Timoshenko beam on a hub"
     others = [each.name for each in wanted if not each.is_in_appendix]
-    return f"the paper's appendix has no {others[0]}, an output of rigs" if others else ""
+    if others:
+        return f"the paper's appendix has no {others[0]}, an output of rigs"
+    return ""
 
 
 def must_be_of_appendix(arm: Arm, theory: Theory, wanted: Sequence[Output] = ()) -> None:

@@ -454,11 +454,10 @@ def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -
     """The inputs of the C function: signals, references, and the feedforward."""
     word = controller.word
     ranges = controller.ranges
-    steps = (
-        f", at most {ranges[RATE] * controller.hub[1]!r} a sample"
-        if controller.hub and RATE in ranges
-        else ""
-    )
+    if controller.hub and RATE in ranges:
+        steps = f", at most {ranges[RATE] * controller.hub[1]!r} a sample"
+    else:
+        steps = ""
     over = ", over {!r}".format if word.precision == FIXED else lambda size: ""
     found = []
     for title, names in zip(("", "reference of "), known, strict=True):

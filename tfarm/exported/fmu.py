@@ -273,7 +273,9 @@ def real_and_imaginary(values: Complex) -> Real:
 
 def braces(values: Any) -> str:
     """An array of C, every number with all of its digits."""
-    return f"{{{', '.join(map(braces, values))}}}" if np.ndim(values) else literal(values)
+    if np.ndim(values):
+        return f"{{{', '.join(map(braces, values))}}}"
+    return literal(values)
 
 
 # ------------------------------------------------------------ the file

@@ -233,16 +233,23 @@ def _graded(case: Case, corners: Sequence[Case], unit: Law | None) -> LiveNumber
 def _known(arm: Arm, is_quiet: bool, are_gains: bool) -> LiveNumbers:
     """Return theorems on gains at the hub, bounds beyond the frequency range, and the static balance."""
     is_reactive = are_gains and arm.is_reactive
-    kind = "reactive" if is_reactive else "quiet" if is_quiet else "band"
+    if is_reactive:
+        kind = "reactive"
+    elif is_quiet:
+        kind = "quiet"
+    else:
+        kind = "band"
     beyond = (
         "|L| < 0.5 beyond the frequency range at all gains of this page: no unstable pole there (small gain)"
     )
     if are_gains and kind != "quiet":
-        beyond = (
-            "C = 0: no mode of the frequency range is driven; not determined beyond"
-            if arm.is_reactive and not arm.reads_hub_moment
-            else "C = 0: every mode beyond the frequency range is damped (Lyapunov), with a decay rate that tends to 0"
-        )
+        if arm.is_reactive and not arm.reads_hub_moment:
+            beyond = "C = 0: no mode of the frequency range is driven; not determined beyond"
+        else:
+            beyond = (
+                "C = 0: every mode beyond the frequency range is damped (Lyapunov), "
+                "with a decay rate that tends to 0"
+            )
     return {
         "kind": kind,
         "beyond": beyond,
@@ -301,7 +308,9 @@ def sampled_numbers(loop: Sampled) -> LiveNumbers:
 def _in_page(case: Case, unit: Law | None) -> LiveNumbers:
     """Return the sampled loop of a case, of gains at the hub or of the parts of `unit`."""
     loop = sampled_verdict(case).full
-    return sampled_numbers(loop) if unit is None else law_in_page(loop, list(unit.part_gains))
+    if unit is None:
+        return sampled_numbers(loop)
+    return law_in_page(loop, list(unit.part_gains))
 
 
 def law_in_page(loop: Sampled, names: Sequence[str]) -> LiveNumbers:

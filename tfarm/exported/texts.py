@@ -64,7 +64,9 @@ def name_in_c(wanted: str) -> dict[str, str]:
 
 def literal(value: float, suffix: str = "") -> str:
     """Return a number in C: whole, or hexadecimal with all its bits."""
-    return f"{value:d}" if isinstance(value, int) else f"{float(value).hex()}{suffix}"
+    if isinstance(value, int):
+        return f"{value:d}"
+    return f"{float(value).hex()}{suffix}"
 
 
 @cache

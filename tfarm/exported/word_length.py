@@ -160,7 +160,9 @@ def gramians(of: StateSpaceLoop) -> tuple[Real, Real] | None:
     rows = of.states
     K = gramian_sum(of.matrix, of.of_signals @ of.of_signals.T, rows)
     W = gramian_sum(of.matrix.T, np.outer(of.output, of.output), rows)
-    return None if K is None or W is None else (K[rows, rows] / (of.output @ K @ of.output), W[rows, rows])
+    if K is None or W is None:
+        return None
+    return (K[rows, rows] / (of.output @ K @ of.output), W[rows, rows])
 
 
 def balancing_transform(K: Real, W: Real) -> Real | None:
@@ -380,7 +382,9 @@ def observable_part(M: Real, left: Real) -> Real:
     seen = abs(left @ vectors).max(axis=0) / abs(left).max()
     # on the unit circle, with a share that no row shows
     gone = (abs(poles) >= 1 - 1e-9) & (seen <= 1e-8)
-    return M - np.real(vectors[:, gone] * poles[gone] @ np.linalg.pinv(vectors)[gone]) if gone.any() else M
+    if gone.any():
+        return M - np.real(vectors[:, gone] * poles[gone] @ np.linalg.pinv(vectors)[gone])
+    return M
 
 
 def word_of(

@@ -239,7 +239,9 @@ class Fit(Solution):
             return "not converged"
         if self.misses:
             return "misses the data"
-        return "fitted, but the arm does not explain the data" if self.is_explained is False else "fitted"
+        if self.is_explained is False:
+            return "fitted, but the arm does not explain the data"
+        return "fitted"
 
     @property
     def in_words(
@@ -272,7 +274,9 @@ class Fit(Solution):
             return None
         words = "no gain, delay, sign or bound is enough: free other numbers of the arm, or add a part that it lacks"
         for best in self.remedies[:1]:
-            return best.in_words if best.is_enough else f"{words}; most helps {best.change}"
+            if best.is_enough:
+                return best.in_words
+            return f"{words}; most helps {best.change}"
         return words
 
 

@@ -58,11 +58,15 @@ class Parameter:
 
     def value(self, coordinate: float) -> float:
         """The number at a coordinate of the search, 0 at the start."""
-        return self.start + self.size * coordinate if self.size else self.start * math.exp(coordinate)
+        if self.size:
+            return self.start + self.size * coordinate
+        return self.start * math.exp(coordinate)
 
     def coordinate(self, value: float) -> float:
         """The coordinate of a number."""
-        return (value - self.start) / self.size if self.size else math.log(value / self.start)
+        if self.size:
+            return (value - self.start) / self.size
+        return math.log(value / self.start)
 
     def per_coordinate(self, value: float) -> float:
         """The change of a number by a coordinate."""

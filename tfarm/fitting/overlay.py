@@ -101,7 +101,9 @@ class Ratio:
     @cached_property
     def driven(self) -> Arm:
         """The arm under the input of the ratio: its own where the ratio is of two signals."""
-        return replace(self.arm, input=cast("Input", self.input)) if self.is_driven else self.arm
+        if self.is_driven:
+            return replace(self.arm, input=cast("Input", self.input))
+        return self.arm
 
     @cached_property
     def above(self) -> TransferFunction:
@@ -127,9 +129,10 @@ class Ratio:
         """Poles and zeros with |Im s| <= up_to [rad/s], as each transfer function has them, complete."""
         own_poles, own_zeros = map(_upper, (self.poles(up_to).values, self.above.zeros(up_to=up_to).values))
         poles, zeros = without_cancelled(own_poles, own_zeros)
-        below = (
-            self.above.system.at_rest if self.below is None else Signals(self.arm, (self.input,)).orders[0]
-        )
+        if self.below is None:
+            below = self.above.system.at_rest
+        else:
+            below = Signals(self.arm, (self.input,)).orders[0]
         return RatioRoots(
             poles=poles,
             zeros=zeros,
@@ -140,7 +143,9 @@ class Ratio:
 
     def poles(self, up_to: float) -> Roots:
         """Its poles if the output had them all; with those at s = 0."""
-        return self.above.poles(up_to=up_to) if self.below is None else self.below.zeros(up_to=up_to)
+        if self.below is None:
+            return self.above.poles(up_to=up_to)
+        return self.below.zeros(up_to=up_to)
 
     def residue(self, pole: complex, roots: RatioRoots) -> complex:
         """The residue at a simple pole: the mean of H (s - p) on a circle that no other of the roots is within.
@@ -339,7 +344,9 @@ class Overlay:
         """The root mean square of ln |measured/exact|, over frequencies above the noise."""
         values = self.measured.values
         kept = (abs(values) > self.noise.sigma) & np.isfinite(self.exact) & (self.exact != 0)
-        return rms(np.log(abs(values[kept] / self.exact[kept]))) if kept.any() else math.inf
+        if kept.any():
+            return rms(np.log(abs(values[kept] / self.exact[kept])))
+        return math.inf
 
     @cached_property
     def required_changes(

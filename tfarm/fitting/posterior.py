@@ -195,7 +195,9 @@ class Repeats:
         """The numbers whose scatter is larger than the noise explains."""
         # a scatter that is 1.5 times that by the noise is named
         larger = [f"{key} {times:.3g} times" for key, times in self.times_wider.items() if times > 1.5]
-        return f"larger than the noise explains: {join_words(larger)}" if larger else "as the noise explains"
+        if larger:
+            return f"larger than the noise explains: {join_words(larger)}"
+        return "as the noise explains"
 
 
 def repeats(fit: Solution, fitted: Sequence[Fitted], draws: int = 40) -> Repeats | None:

@@ -247,7 +247,9 @@ def departures(
 
 def overshoot(angle: Real, step: float, end: float) -> float:
     """The overshoot of an angle [rad] beyond the `end` of a step [rad], as a share of it; below 0 where it has none."""
-    return float(np.max((angle - end) * np.sign(step)) / abs(step)) if step else 0.0
+    if step:
+        return float(np.max((angle - end) * np.sign(step)) / abs(step))
+    return 0.0
 
 
 def load_run(name_or_path: AnyFile) -> MeasuredRun | None:

@@ -124,7 +124,9 @@ def aligning_delay(omega: Real, ratio: Complex) -> float:
     delays = np.linspace(-period, period, 2 * count + 1)
     phases = np.sign(ratio)
     aligned = abs(np.exp(1j * np.outer(delays, omega)) @ phases)
-    return float(delays[aligned.argmax()]) if aligned.max() > 1.5 * aligned[count] else 0.0
+    if aligned.max() > 1.5 * aligned[count]:
+        return float(delays[aligned.argmax()])
+    return 0.0
 
 
 def thin_problem(problem: Problem, most: int) -> Problem:
@@ -252,7 +254,9 @@ def _nearest(found: Solution) -> Solution:
         back = replace(back, jacobian=problem.jacobian(back.point), converged=found.converged)
         fewest = max(1, len(open_axes(found.jacobian)))
         if back.chi_squared < least + most and len(open_axes(back.jacobian)) >= fewest:
-            return back if back.chi_squared < least + SAME_SUM else replace(found, jacobian=back.jacobian)
+            if back.chi_squared < least + SAME_SUM:
+                return back
+            return replace(found, jacobian=back.jacobian)
     return found
 
 
@@ -449,11 +453,15 @@ def _one_sided(found: Solution, n: int, quantile: float) -> tuple[float | None, 
         # of ln p: where a number that does not matter is tried
         steps = (own + way * reach for reach in (0.5, 1.0, 2.0, 4.0, 6.0, 9.0))
         beyond = next((at for at in steps if low <= at <= high and excess(at) > 0), None)
-        return None if beyond is None else each.value(float(brentq(excess, own, beyond, xtol=1e-4)))
+        if beyond is None:
+            return None
+        return each.value(float(brentq(excess, own, beyond, xtol=1e-4)))
 
     lower = end(-1)
     upper = end(1)
-    return (None, None) if lower is None and upper is None else (lower or 0.0, upper)
+    if lower is None and upper is None:
+        return (None, None)
+    return (lower or 0.0, upper)
 
 
 def _end(found: Solution, n: int, at: float, quantile: float, held: dict[int, float]) -> float:

@@ -403,7 +403,9 @@ def _left_of(loop: Sampled, line: float, top: float) -> Real | None:
     away = _integral(
         lambda c: sizes(-c + 1j * top), line + np.r_[0.0, _graded(0.01 / remaining, 45.0 / remaining)]
     )
-    return None if up is None or away is None else (up + away) * (2 / np.pi) * (1 + 2 * SURE)
+    if up is None or away is None:
+        return None
+    return (up + away) * (2 / np.pi) * (1 + 2 * SURE)
 
 
 def _graded(first: float, last: float) -> Real:

@@ -95,7 +95,9 @@ def _lowest(terms: Sequence[tuple[int, float]]) -> tuple[float, float]:
 def _real_gain(A: Any, B: Any) -> float:
     """The real gain g of A + g B = 0 where A and B are real; inf where there is none."""
     # 1e-12 of the terms without a gain: smaller terms of the gain are rounding
-    return float(-A.real / B.real) if abs(B.real) > 1e-12 * abs(A.real) else math.inf
+    if abs(B.real) > 1e-12 * abs(A.real):
+        return float(-A.real / B.real)
+    return math.inf
 
 
 # ------------------------------------------------------------ windows
@@ -255,8 +257,6 @@ def with_both_sides(K1: Real, ends: Real) -> Real:
 def _off_the_edge(values: Real) -> float:
     """A gain inside the range that is on no rounded edge."""
     # the golden section of a range is on no rounded number and no grid
-    return (
-        float(values[0] + 0.6180339887498949 * (values[-1] - values[0]))
-        if values.size > 1
-        else float(values[0])
-    )
+    if values.size > 1:
+        return float(values[0] + 0.6180339887498949 * (values[-1] - values[0]))
+    return float(values[0])

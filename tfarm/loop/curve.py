@@ -65,7 +65,9 @@ class LoopCurve:
         ),
     ]:
         """The gain margin [dB] upwards at its phase crossover."""
-        return None if self.margins is None else At(*gain_margin(self.margins, self.margins.gain[1]))
+        if self.margins is None:
+            return None
+        return At(*gain_margin(self.margins, self.margins.gain[1]))
 
     @property
     def magnitude(

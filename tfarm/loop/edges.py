@@ -149,7 +149,9 @@ def most_modes(arm: Arm, chain: Chain) -> int:
     # of a whole loop: half a second of work
     most_loop_modes = 128
     # 4 modes of a whole loop decay within a sample
-    return min(most_loop_modes, 4 + count_lasting_modes(arm, chain)) if arm.least_damping else most_loop_modes
+    if arm.least_damping:
+        return min(most_loop_modes, 4 + count_lasting_modes(arm, chain))
+    return most_loop_modes
 
 
 def whole_loop(case: Case) -> Sampled:

@@ -263,7 +263,9 @@ def unstable_below(loop: ContinuousLoop, band: float) -> int:
 def critical(name: str, limits: Window) -> tuple[float, ...]:
     """Values of a number at which the band must be sufficient: its limits, and 0 of a leading coefficient."""
     low, high = limits
-    return (low, 0.0, high) if name.endswith(LEADING) and low < 0 < high else limits
+    if name.endswith(LEADING) and low < 0 < high:
+        return (low, 0.0, high)
+    return limits
 
 
 def static_edge(loop: ContinuousLoop, name: str, limits: Window) -> Crossing | None:

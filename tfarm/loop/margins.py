@@ -110,9 +110,9 @@ class Margins(LoopAnalysis):
     @property
     def delay_margin_seconds(self) -> float | None:
         """The delay margin [s], or that in the frequency range where the exact one is not determined."""
-        return (
-            self.in_band.delay if self.in_band is not None and self.exact_delay is None else self.exact_delay
-        )
+        if self.in_band is not None and self.exact_delay is None:
+            return self.in_band.delay
+        return self.exact_delay
 
     def factor_intervals(self, delays: Real) -> list[Sequence[Window]]:
         """Return the intervals of a factor on the law, 0 to 4, at each further delay [s] (n,), from a map of both."""
@@ -137,7 +137,9 @@ class Margins(LoopAnalysis):
     ) -> Annotated[float | None, replace(PEAK_COMPLEMENTARY, label=f"{PEAK_COMPLEMENTARY.label}, exact")]:
         """Peak of T = 1 - S of the whole infinite-dimensional loop: not determined, or infinite, where that of S is."""
         is_open = self.exact_peak is None or math.isinf(self.exact_peak)
-        return self.exact_peak if is_open or self.in_band is None else self.in_band.peak_complementary
+        if is_open or self.in_band is None:
+            return self.exact_peak
+        return self.in_band.peak_complementary
 
     @property
     def gain_margin(

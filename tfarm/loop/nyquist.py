@@ -74,7 +74,9 @@ class Nyquist:
     @cached_property
     def sensitivity_peak(self) -> At | None:
         """The loop's own Ms with its frequency; None of an unstable loop."""
-        return None if self.verdict.in_band is None else self.verdict.in_band.sensitivity_peak
+        if self.verdict.in_band is None:
+            return None
+        return self.verdict.in_band.sensitivity_peak
 
 
 def nyquist(arm: Arm, law: AnyLaw) -> Nyquist:

@@ -110,7 +110,9 @@ class Plane(PlaneOfCounts):
     @property
     def reach(self) -> Annotated[str, Quantity("frequency range", help="poles in it are counted completely")]:
         """The frequency range in words."""
-        return f"up to {self.band:.6g} rad/s" if self.band else "every mode, by a theorem"
+        if self.band:
+            return f"up to {self.band:.6g} rad/s"
+        return "every mode, by a theorem"
 
     @property
     def arm(self) -> Arm:
@@ -324,7 +326,9 @@ def _counts_across(row: ContinuousLoop, name: str, x: Real, band: float) -> NDAr
 
 def _farthest(values: Real, at: Real) -> int:
     """Index of the value that is farthest from all crossings; of the middle one where there are none."""
-    return int(np.argmax(abs(values[:, None] - at).min(axis=1))) if at.size else values.size // 2
+    if at.size:
+        return int(np.argmax(abs(values[:, None] - at).min(axis=1)))
+    return values.size // 2
 
 
 def boundary(loop: ContinuousLoop, omega: Real) -> Real:
@@ -426,7 +430,9 @@ def rate_columns(arm: Arm, x: Axis, number: int) -> Real:
     """
     across = x.grid(number)
     least = -arm.rate_loss
-    return across[across > least] if arm.has_rigid_mode else across[across != least]
+    if arm.has_rigid_mode:
+        return across[across > least]
+    return across[across != least]
 
 
 def moment_axis(arm: Arm, x: Axis) -> Axis:

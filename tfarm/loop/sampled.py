@@ -316,9 +316,10 @@ class Sampled(Loop):
         Such are an integrator of a signal that is 0 at rest, one of two parallel integrators, a hub without feedback of
         its rate.  The order of x^N F, N the poles of the plant there, at x = 1 - 1/z = 0 is the least of its terms.
         """
-        poles = (
-            0 if not self.plant.arm.has_rigid_mode else (1 if self.rig.is_damped else 2) - self.has_free_angle
-        )
+        if not self.plant.arm.has_rigid_mode:
+            poles = 0
+        else:
+            poles = (1 if self.rig.is_damped else 2) - self.has_free_angle
         return max(0, poles + min(n for n, _ in self.rig.near_one(self.row)))
 
     @property

@@ -213,7 +213,11 @@ def dominant(loop: Sampled) -> str:
     mode, rings = (
         (int(loop.pulse.mode[origin]), loop.pulse.poles[origin].imag != 0) if origin >= 0 else (0, False)
     )
-    return f"mode {mode}" if mode else "an unassigned mode" if rings else "the hub"
+    if mode:
+        return f"mode {mode}"
+    if rings:
+        return "an unassigned mode"
+    return "the hub"
 
 
 def _matched(ahead: Complex, z: Complex) -> NDArray[np.int64]:

@@ -116,7 +116,12 @@ class SampledRig:
                 n, value = lowest_power(zeros)
                 rest = at_rest[row]
                 twice, once = plant.rigid[row]
-                own = (-2, twice * T * T) if twice else (-1, once * T) if once else (0, rest)
+                if twice:
+                    own = (-2, twice * T * T)
+                elif once:
+                    own = (-1, once * T)
+                else:
+                    own = (0, rest)
                 # 1e-11 of its terms: a static gain that is 0, summed over 400 modes
                 if own[0] == 0 and abs(rest) <= 1e-11 * size[row]:
                     own = (1, slopes[row])

@@ -163,7 +163,11 @@ class Verdict(OfLoop, LoopVerdict):
     ]:
         """stable, marginal or unstable."""
         growth = self.log_radius
-        return "unstable" if growth > 0 else "stable" if growth < 0 else "marginal"
+        if growth > 0:
+            return "unstable"
+        if growth < 0:
+            return "stable"
+        return "marginal"
 
     @property
     def sentence(
@@ -223,7 +227,9 @@ class Verdict(OfLoop, LoopVerdict):
         ),
     ]:
         """Time constant of the dominant pole, below 0 where it grows."""
-        return -self.loop.chain.sampling.period / self.log_radius if self.log_radius else None
+        if self.log_radius:
+            return -self.loop.chain.sampling.period / self.log_radius
+        return None
 
     @property
     def oscillating_poles(self) -> list[tuple[int, complex]]:
@@ -551,7 +557,9 @@ class Analysis(LoopAnalysis):
     @cached_property
     def damping_limit(self) -> Figure | Limit | None:
         """The same with a test of its digits, which takes as long as the search."""
-        return damping_limit(self.loop, self.damping_modes) if self.loop.is_of_gains else None
+        if self.loop.is_of_gains:
+            return damping_limit(self.loop, self.damping_modes)
+        return None
 
     def factor_intervals(self, delays: Real) -> list[Sequence[Window]]:
         """Return the intervals of a positive factor on the law at each further delay [s] (n,)."""
@@ -635,7 +643,12 @@ class SampledBrief:
     @property
     def short(self) -> str:
         """The verdict in a few words, for a legend or a card."""
-        verdict = "undecided" if self.is_stable is None else "stable" if self.is_stable else "UNSTABLE"
+        if self.is_stable is None:
+            verdict = "undecided"
+        elif self.is_stable:
+            verdict = "stable"
+        else:
+            verdict = "UNSTABLE"
         return f"{verdict} when sampled every {1e3 * self.period:g} ms"
 
 

@@ -142,7 +142,9 @@ class Stability(LoopVerdict):
         self,
     ) -> Annotated[str | None, Quantity("free hub angle", help="pole at 0 that verdicts leave out")]:
         """The pole at 0 that the verdict leaves out."""
-        return "its pole at s = 0 is left out" if self.poles.moving.size < self.poles.values.size else None
+        if self.poles.moving.size < self.poles.values.size:
+            return "its pole at s = 0 is left out"
+        return None
 
     @property
     def is_stable(self) -> Annotated[bool, Quantity(key="stable", help="whether the verdict is stable")]:
@@ -163,13 +165,12 @@ class Stability(LoopVerdict):
     @property
     def range_words(self) -> str:
         """The range in which poles are counted, and what is known beyond."""
-        known = (
-            ", small gain beyond"
-            if self.tail == SMALL_GAIN
-            else ", theorem beyond"
-            if self.is_known_beyond
-            else ""
-        )
+        if self.tail == SMALL_GAIN:
+            known = ", small gain beyond"
+        elif self.is_known_beyond:
+            known = ", theorem beyond"
+        else:
+            known = ""
         return f"converged to {self.band:.4g} rad/s{known}"
 
     @property
@@ -280,7 +281,12 @@ def verdict_on(loop: ContinuousLoop, band: float | None = None) -> Stability:
     height, quiet = (band, False) if band is not None else band_of_loop(loop)
     poles = poles_below(loop, height, listed_left)
     delayed = DELAYED if loop.arm.is_undamped and loop.law.delay and loop.feeds_back else ""
-    tail = theorem.reason if theorem.energy is not None else SMALL_GAIN if quiet else delayed
+    if theorem.energy is not None:
+        tail = theorem.reason
+    elif quiet:
+        tail = SMALL_GAIN
+    else:
+        tail = delayed
     is_infinite = theorem.energy == GIVES or tail == DELAYED
     verdict = _verdict(poles, is_infinite)
     words = tail or unknown_above.format(band=height)
@@ -302,7 +308,9 @@ def _verdict(poles: Poles, is_infinite: bool) -> str:
     on_axis = moving[share > -MARGIN_OF_ZERO]
     if arm.loses_at_hub_alone:
         known = poles.loop.theorem.energy == TAKES or not on_axis.size
-        return "stable" if known and is_controllable(arm.lossless_hub, poles.box.im_max) else "marginal"
+        if known and is_controllable(arm.lossless_hub, poles.box.im_max):
+            return "stable"
+        return "marginal"
     if on_axis.size:
         text = (
             f"the pole at {on_axis[0]:.6g} 1/s is on the imaginary axis to working precision: not determined"
@@ -453,7 +461,9 @@ class Spill:
         lowest = float(self.driven[0].imag)
         table = modes(self.verdict.loop.arm, up_to=2.0 * max(lowest, 1.0) + self.verdict.band)
         flexible = table.natural_frequency[table.index > 0]
-        return 0 if lowest < flexible[0] / 2 else int(np.argmin(abs(flexible - lowest))) + 1
+        if lowest < flexible[0] / 2:
+            return 0
+        return int(np.argmin(abs(flexible - lowest))) + 1
 
     @property
     def shown_from(self) -> Annotated[int | None, SHOWN_FROM]:
@@ -493,9 +503,10 @@ class Spill:
             models = f"the model of {first} mode{'s' * (first > 1)} is"
         elif last - first + 1 != count:
             models = f"{count} of the models up to {last} modes are"
-        end = (
-            f"those from {self.shown_from} modes on are not" if self.shown_from else "the largest among them"
-        )
+        if self.shown_from:
+            end = f"those from {self.shown_from} modes on are not"
+        else:
+            end = "the largest among them"
         return f"{words}; {models} stable, {end}"
 
 

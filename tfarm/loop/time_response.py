@@ -427,4 +427,6 @@ def _circle(
     nodes = int(np.clip(-node_log / math.log(ratio), pole_nodes if is_simple else fewest_nodes, most_nodes))
     arrow = radius * np.exp(2j * np.pi * (np.arange(nodes) + 0.5) / nodes)
     values = transform(c + arrow) * arrow / nodes
-    return (own, values.sum(axis=1)[:, None]) if is_simple else (c + arrow, values)
+    if is_simple:
+        return (own, values.sum(axis=1)[:, None])
+    return (c + arrow, values)

@@ -95,7 +95,9 @@ class Varied:
     def unit(self) -> str:
         """The SI unit of the number, "1" of a pure one."""
         of_other = ARM_PARAMETERS | {"delay": "s"}
-        return unit_of(self.vary, self.case.arm) if self.vary in NAMES else of_other.get(self.vary, "1")
+        if self.vary in NAMES:
+            return unit_of(self.vary, self.case.arm)
+        return of_other.get(self.vary, "1")
 
     @property
     def title(self) -> Title:
@@ -121,15 +123,15 @@ class Varied:
 
     def law_at(self, value: float) -> Law:
         """The law where the number has that value."""
-        return (
-            self.full
-            if self.is_of_arm
-            else self.full.having("gain" if self.vary == "all" else self.vary, value)
-        )
+        if self.is_of_arm:
+            return self.full
+        return self.full.having("gain" if self.vary == "all" else self.vary, value)
 
     def at(self, value: float) -> ContinuousLoop:
         """The loop where the number has that value."""
-        return self._of_arm(value) if self.is_of_arm else self.first.under(self.law_at(value))
+        if self.is_of_arm:
+            return self._of_arm(value)
+        return self.first.under(self.law_at(value))
 
     # arms at values that are needed again
     @cached_property
@@ -145,11 +147,9 @@ class Varied:
     @cached_property
     def first(self) -> ContinuousLoop:
         """The loop at the first value."""
-        return (
-            self.at(self.start)
-            if self.is_of_arm
-            else ContinuousLoop(self.case.under(self.law_at(self.start)))
-        )
+        if self.is_of_arm:
+            return self.at(self.start)
+        return ContinuousLoop(self.case.under(self.law_at(self.start)))
 
     @cached_property
     def pinned(self) -> int:

@@ -93,7 +93,11 @@ class Windows:
 
     def end(self, value: float) -> End:
         """The kind of an end of one of the intervals."""
-        return "no limit" if math.isinf(value) else "search bound" if value in self.looked_at else "edge"
+        if math.isinf(value):
+            return "no limit"
+        if value in self.looked_at:
+            return "search bound"
+        return "edge"
 
 
 # ------------------------------------------------------------ intervals

@@ -52,9 +52,9 @@ class _Scale:
 
 def _depth(section: Any) -> float:
     """Return the depth [m] in the plane of bending; of a general section that of a rectangle with its I/A."""
-    return (
-        math.sqrt(12) * section.radius_of_gyration if section.half_depth is None else 2 * section.half_depth
-    )
+    if section.half_depth is None:
+        return math.sqrt(12) * section.radius_of_gyration
+    return 2 * section.half_depth
 
 
 def _size(arm: Arm) -> tuple[float, float]:

@@ -63,7 +63,9 @@ def decisive(band: LoopMargins) -> Iterator[tuple[float, complex, str, str]]:
 def _at(size: float, unit: str, omega: float | None) -> str:
     """A margin with its frequency."""
     where = f" at {general(omega, DIGITS)} rad/s" if omega else ""
-    return f"{general(size, DIGITS)}{unit and f' {unit}'}{where}" if math.isfinite(size) else "no limit"
+    if math.isfinite(size):
+        return f"{general(size, DIGITS)}{unit and f' {unit}'}{where}"
+    return "no limit"
 
 
 def _looks(curve: LoopCurve, of: str = "", color: str = BLUE) -> Looks:

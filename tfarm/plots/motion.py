@@ -240,7 +240,9 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
 
 
 def _input_label(arm: Arm) -> str:
-    return "motor torque [N m]" if arm.input_unit == "N m" else f"motor [{arm.input_unit}]"
+    if arm.input_unit == "N m":
+        return "motor torque [N m]"
+    return f"motor [{arm.input_unit}]"
 
 
 FIGURES.update({Run: lambda run: slew.figure(run.arm, run.simulation, run.scenario_in_words)})

@@ -240,16 +240,16 @@ class _Bench:
         found: list[ReducedModel] = []
         if self.by_aaa and pairs > self.inside:
             model = rational_model(*of, pairs, self.band[1], self.x)
-            few = (
-                "" if model.order == order else f"order below {order}: no more poles passed the checks of AAA"
-            )
+            if model.order == order:
+                few = ""
+            else:
+                few = f"order below {order}: no more poles passed the checks of AAA"
             found.append(self._measured(model, "aaa", few))
         if self.by_modes or not found:
-            note = (
-                ""
-                if self.by_modes
-                else f"method modal: AAA needs more than the {self.inside} modes in the range"
-            )
+            if self.by_modes:
+                note = ""
+            else:
+                note = f"method modal: AAA needs more than the {self.inside} modes in the range"
             found.append(self._measured(modal_model(*of, pairs, self.x), "modal", note))
             # modes: slow poles replace omitted ones that are overdamped
             less = pairs - SLOW_PAIRS

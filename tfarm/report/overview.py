@@ -85,11 +85,9 @@ def results(found: ResultCard, controller: str) -> list[dict[str, Any]]:
 def in_words(value: Any) -> Any:
     """A value of JSON as a page shows it."""
     digits = 4
-    return (
-        {key: in_words(each) for key, each in value.items()}
-        if isinstance(value, dict)
-        else text(value, digits)
-    )
+    if isinstance(value, dict):
+        return {key: in_words(each) for key, each in value.items()}
+    return text(value, digits)
 
 
 def blocks(sections: Mapping[str, PageSection]) -> Iterator[tuple[PageSection, SavedBlock | None]]:

@@ -111,15 +111,17 @@ class PageCase(OfCase):
     @property
     def own_name(self) -> str:
         """The name of the controller itself, or its gains with their values."""
-        return one_line(self.law.name, 60) if self.case.gains is None else gains_words(self.law)
+        if self.case.gains is None:
+            return one_line(self.law.name, 60)
+        return gains_words(self.law)
 
     @property
     def gains(self) -> str:
         """Its gains with their values, or the signals that it reads."""
         law = self.law
-        return (
-            f"order {law.order}, of {', '.join(law.signals)}" if self.case.gains is None else gains_words(law)
-        )
+        if self.case.gains is None:
+            return f"order {law.order}, of {', '.join(law.signals)}"
+        return gains_words(law)
 
     @property
     def title(self) -> str:
@@ -206,7 +208,9 @@ class PageCase(OfCase):
     @property
     def run(self) -> RunComparison | None:
         """The measured run with that of the sampled loop, if one was measured."""
-        return None if self.measured is None else compare_run(self.case, self.measured)
+        if self.measured is None:
+            return None
+        return compare_run(self.case, self.measured)
 
     @property
     def growth(self) -> float:

@@ -83,11 +83,9 @@ def chain_words(arm: Arm, chain: Chain) -> str:
 
 def _stem(name: str, each: PageCase) -> str:
     """The name of a controller's table; the first has no more than the name."""
-    return (
-        f"sampled-{name}"
-        if each.key in ("default", "law")
-        else f"sampled-{name}-{each.key.replace('_', '-')}"
-    )
+    if each.key in ("default", "law"):
+        return f"sampled-{name}"
+    return f"sampled-{name}-{each.key.replace('_', '-')}"
 
 
 def delays_table(report: ArmReport) -> Table:

@@ -311,7 +311,9 @@ class Bode:
     @property
     def label(self) -> str:
         """The output in words."""
-        return self.row.label if self.x is None else self.row.label.replace("at x", f"at x = {self.x:g} m")
+        if self.x is None:
+            return self.row.label
+        return self.row.label.replace("at x", f"at x = {self.x:g} m")
 
     @property
     def gain_unit(
@@ -323,7 +325,9 @@ class Bode:
     @property
     def input_label(self) -> str:
         """The input in words."""
-        return "torque" if self.input == "hub_torque" else self.input.replace("_", " ")
+        if self.input == "hub_torque":
+            return "torque"
+        return self.input.replace("_", " ")
 
 
 def resonant_band(arm: Arm, resonances: int = 10) -> tuple[float, float]:

@@ -195,9 +195,10 @@ class TransferFunction:
         self.method = known_method(method)
         self.arm = arm
         self.is_single = isinstance(outputs, str | Output)
-        each = (
-            tuple(outputs) if isinstance(outputs, Iterable) and not isinstance(outputs, str) else (outputs,)
-        )
+        if isinstance(outputs, Iterable) and not isinstance(outputs, str):
+            each = tuple(outputs)
+        else:
+            each = (outputs,)
         require(each, "outputs", outputs, "name at least one output")
         self.rows: tuple[Output, ...] = tuple(map(output, each))
         self.system: System = system_of(arm)
@@ -410,11 +411,11 @@ class TransferPoints:
         """A row for each point."""
         first = roots_table(self.s, Quantity("s", "1 / s", 12)).columns
         value = self.value
-        pairs = (
-            zip(*value, strict=True)
-            if isinstance(value, list)
-            else (value.real.tolist(), value.imag.tolist())
-        )
+        pairs: Iterable[Any]
+        if isinstance(value, list):
+            pairs = zip(*value, strict=True)
+        else:
+            pairs = (value.real.tolist(), value.imag.tolist())
         values = (
             Column(f"{part}_{self.output}", f"{part} {self.output}", self.gain_unit, of=list(of))
             for part, of in zip(("re", "im"), pairs, strict=True)
@@ -426,9 +427,11 @@ class TransferPoints:
 def values_at(G: TransferFunction, s: Complex, digits: int | None = None) -> TransferPoints:
     """Return the response at s, with certified digits for more than 15 of them."""
     right = digits or 0
-    value = (
-        np.asarray(G(s)) if right <= DOUBLE_DIGITS else [list(G.digits(complex(each), right)) for each in s]
-    )
+    value: Any
+    if right <= DOUBLE_DIGITS:
+        value = np.asarray(G(s))
+    else:
+        value = [list(G.digits(complex(each), right)) for each in s]
     return TransferPoints(
         s, value, G.arm.name, G.input, G.input_unit, G.outputs[0], G.units[0], G.x, G.method
     )

@@ -173,7 +173,9 @@ def to_json_value(value: Any) -> Any:
     if is_declared(value):
         return to_dict(value)
     if isinstance(value, np.ndarray | np.generic):
-        return to_json_value(value.tolist()) if np.iscomplexobj(value) else value.tolist()
+        if np.iscomplexobj(value):
+            return to_json_value(value.tolist())
+        return value.tolist()
     if isinstance(value, complex):
         return None if math.isnan(value.real) else [value.real, value.imag]
     if isinstance(value, Mapping):
@@ -195,7 +197,9 @@ def with_unit(value: Any, of: Quantity) -> str:
     # of a figure, such as the modes for which it holds
     number, _, note = shown.partition(" (")
     after = f" ({note}" if note else ""
-    return f"{number} {of.unit}{after}" if of.unit and shown not in ("", NO_VALUE) else shown
+    if of.unit and shown not in ("", NO_VALUE):
+        return f"{number} {of.unit}{after}"
+    return shown
 
 
 def text(value: Any, digits: int = 6) -> str:
@@ -212,7 +216,9 @@ def text(value: Any, digits: int = 6) -> str:
         return general(value, digits)
     if isinstance(value, complex):
         re, im = round_parts(value, digits)
-        return re if not value.imag else f"{re}{'' if im.startswith('-') else '+'}{im}i"
+        if not value.imag:
+            return re
+        return f"{re}{'' if im.startswith('-') else '+'}{im}i"
     if isinstance(value, Mapping):
         return ", ".join(f"{key} {text(entry, digits)}" for key, entry in value.items())
     shown = ", ".join(text(entry, digits) for entry in value)

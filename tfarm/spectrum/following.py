@@ -266,7 +266,9 @@ def _of_couple(weights: Any, first: Any, second: Any, base: Any, other: Any) -> 
     if abs(way) < 0.5 * abs(root) * abs(apart):
         way = (root.real + root.imag) * (apart.real + apart.imag)
     middle = _of_one(weights, first, second, (base + other) / 2.0)
-    return (middle - root, middle + root) if way < 0.0 else (middle + root, middle - root)
+    if way < 0.0:
+        return (middle - root, middle + root)
+    return (middle + root, middle - root)
 
 
 def correct_roots(family: Family, values: Real, guess: Complex, base: Complex) -> Complex:

@@ -175,11 +175,10 @@ class ModeList:
         if without:
             notes.append(f"no eigenvalue is assigned for certain to mode {', '.join(map(str, without))}")
         if self.damped.left_out:
-            why = (
-                f"a list has at most {MOST_MODES}"
-                if last == MOST_MODES
-                else "the box of more could not be searched"
-            )
+            if last == MOST_MODES:
+                why = f"a list has at most {MOST_MODES}"
+            else:
+                why = "the box of more could not be searched"
             notes.append(f"eigenvalues up to mode {last} only: {why}")
         return "; ".join(notes) or None
 
@@ -204,7 +203,12 @@ def listed_modes(
     With `certify` each flexible mode has its bracket and its discs, and the list a certified count.  `method` is that
     of the frequencies.  Raises CertificationError where a bracket fails.
     """
-    wanted = None if not certify else DOUBLE_DIGITS if digits is None else digits
+    if not certify:
+        wanted = None
+    elif digits is None:
+        wanted = DOUBLE_DIGITS
+    else:
+        wanted = digits
     proof = None if wanted is None else found.certify(wanted)
     damped = None
     discs = None
@@ -218,9 +222,9 @@ def listed_modes(
             failure = f"damped modes: {error}"
     rows = list(_rows(found, digits, method, damped, proof, discs))
     free = () if damped is None else damped.unassigned
-    enclosed = (
-        [None] * len(free) if discs is None else [tuple(each) for each in discs[len(discs) - len(free) :]]
-    )
+    enclosed: list[Any] = [None] * len(free)
+    if discs is not None:
+        enclosed = [tuple(each) for each in discs[len(discs) - len(free) :]]
     unassigned = [each._replace(discs=disc) for each, disc in zip(free, enclosed, strict=True)]
     return ModeList(
         found=found,

@@ -90,7 +90,9 @@ def _bracket(k: System, omega: float, digits: int) -> tuple[Fraction, Fraction]:
             return None
         lower = int(number) * unit
         upper = (int(number) + 1) * unit
-        return (lower, upper) if axis.drive(rational(lower)) * axis.drive(rational(upper)) < 0 else None
+        if axis.drive(rational(lower)) * axis.drive(rational(upper)) < 0:
+            return (lower, upper)
+        return None
 
     text = (
         f"no certified sign change in {digits} digits near {omega:.15g} rad/s: a double or a very close pair"

@@ -211,7 +211,9 @@ class Shapes:
         units = np.eye(4)[:, :, None] + none
         size = np.maximum(abs(A), 1.0)
         balance = [none, A / size, -1.0 / size, none]
-        return np.array([units[0], balance, units[1], units[3]]) if self.system.drive.turns else units
+        if self.system.drive.turns:
+            return np.array([units[0], balance, units[1], units[3]])
+        return units
 
     def _responses(self, places: tuple[Place, ...]) -> Iterator[tuple[Whole, Real, Real, Real]]:
         """Yield each response: the modes that have it, its frequencies, states (4, modes, places) and hub angles."""

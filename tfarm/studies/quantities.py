@@ -89,7 +89,9 @@ def loop_of(name: str) -> str:
 
 def stability_of(name: str) -> str:
     """Return the column of the stability of the loop of a column, empty for one of the arm alone."""
-    return f"{name.partition(loop)[0]}{loop}.stability" if (loop := loop_of(name)) else ""
+    if loop := loop_of(name):
+        return f"{name.partition(loop)[0]}{loop}.stability"
+    return ""
 
 
 def _most(names: Set[str]) -> int:

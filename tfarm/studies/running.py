@@ -124,7 +124,9 @@ def _attempt(function: Callable[..., Any], *arguments: Any) -> Any:
     try:
         return function(*arguments)
     except Exception as error:
-        return str(error) if isinstance(error, TfarmError) else f"{type(error).__name__}: {error}"
+        if isinstance(error, TfarmError):
+            return str(error)
+        return f"{type(error).__name__}: {error}"
 
 
 # ------------------------------------------------------------------------------------------------------------ parts

@@ -275,11 +275,10 @@ class Subjects:
     def at(self, row: Sequence[float]) -> Subject:
         """Return the case of a row.  Raises ParameterError for an illegal value."""
         values = dict(zip(self.keys, row, strict=True))
-        arm = (
-            self._arms.at({key: values[key] for key in self._arms.keys})
-            if self._arms.keys
-            else self._arms.arm
-        )
+        if self._arms.keys:
+            arm = self._arms.at({key: values[key] for key in self._arms.keys})
+        else:
+            arm = self._arms.arm
         law = self.case.feedback
         for key in self._of_law:
             law = law.having(key.removeprefix(LAW), values[key])

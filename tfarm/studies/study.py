@@ -339,7 +339,9 @@ def usual_workers(client: Any) -> int:
     """Return the number of workers of a client of Dask, or of processors of this machine that may be used."""
     if client is not None:
         return max(1, len(client.nthreads()))
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 # ------------------------------------------------------------------------------------------------------------ file

@@ -127,7 +127,9 @@ class DesignModel:
 
     def in_s(self, poles: Complex) -> Complex:
         """s of poles, times the period of a sampled loop; 1 of poles at z = 0."""
-        return poles if self.period is None else np.log(np.where(poles == 0, np.e, poles))
+        if self.period is None:
+            return poles
+        return np.log(np.where(poles == 0, np.e, poles))
 
     # ------------------------------------------------------------ loop function
 

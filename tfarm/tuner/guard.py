@@ -303,7 +303,9 @@ def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
     high = min(high for _, high in found)
     edge = (1 - RADIUS_SHARE) * (high - low)
     is_wide = high - low >= NARROWEST_SECTOR
-    return _guard("frozen", loops, found, low + edge * (low > 0), high - edge) if is_wide else None
+    if is_wide:
+        return _guard("frozen", loops, found, low + edge * (low > 0), high - edge)
+    return None
 
 
 def _moving(loops: list[Sampled], best_constant: float) -> Guard | None:
@@ -313,7 +315,9 @@ def _moving(loops: list[Sampled], best_constant: float) -> Guard | None:
     if m is None:
         return None
     half = RADIUS_SHARE * min(model.radius(m) for model in models)
-    return _certified(models, max(0.0, m - half), m + half, m) if half >= NARROWEST_SECTOR else None
+    if half >= NARROWEST_SECTOR:
+        return _certified(models, max(0.0, m - half), m + half, m)
+    return None
 
 
 def sector_guard(loop: Sampled, lo: float, hi: float) -> Guard | None:
