@@ -131,6 +131,7 @@ class Judge:
     modes: int
     model: DesignModel
     also: tuple[DesignModel, ...]
+    delayed: tuple[DesignModel, ...] = ()
 
     @property
     def is_sampled(self) -> bool:
@@ -296,7 +297,7 @@ def judge_of(
     arm: Arm,
     known: Arm,
     chain: Chain,
-    objective: str,
+    objective: Any,
     signals: tuple[str, ...],
     modes: int,
     count: int,
@@ -304,7 +305,7 @@ def judge_of(
     continuous: bool = False,
 ) -> Judge:
     """The judge of laws on these signals, with `count` flexible modes; more of the continuous-time loop."""
-    aim = OBJECTIVES[objective]
+    aim = OBJECTIVES[objective] if isinstance(objective, str) else objective
     signals = tuple(dict.fromkeys((*signals, *("root_moment",) * aim.of_slew)))
     known, _ = arm_under_chain(known, chain)
     arm, chain = arm_under_chain(arm, chain)

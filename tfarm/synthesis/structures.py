@@ -162,7 +162,14 @@ class Structure:
 
 
 def structure_of(
-    name: str, arm: Arm, *, Kp: float, modes: int, period: float, bounds: Mapping[str, Bounds | None]
+    name: str,
+    arm: Arm,
+    *,
+    Kp: float,
+    modes: int,
+    period: float,
+    bounds: Mapping[str, Bounds | None],
+    is_angle_free: bool = False,
 ) -> Structure:
     """Return the structure of that name for an arm at a sampling period [s].
 
@@ -171,6 +178,7 @@ def structure_of(
     Raises ParameterError for an unknown structure, bad bounds or Kp, and for gains too large for the arm.
     """
     must_be_known("structure", name, STRUCTURES)
+    is_given = bool(Kp)
     if name != TWO_GAINS:
         require(0.0 <= Kp < np.inf, ANGLE_GAIN, Kp, "the hub angle gain is zero (chosen) or positive")
         speed = 0.1 * min(first_frequency(arm), 1 / period)
@@ -184,7 +192,16 @@ def structure_of(
             require(is_range, key, pair, "bounds are two finite numbers, the lower first")
             given[key] = (float(pair[0]), float(pair[1]))
     free = tuple(each._replace(bounds=given.get(each.name, each.bounds)) for each in free)
-    form = Structure(name, free, {ANGLE_GAIN: Kp}, entries, tuple(given))
+    is_free = is_angle_free and not is_given and name != TWO_GAINS
+    if is_free:
+        # a slow integral is a slow pole, which a search for speed leaves without a limit of Ki
+        free = tuple(
+            positive_coefficient("Ki", each.start, reach=REACH**2) if each.name == "Ki" else each for each in free
+        )
+        free = (positive_coefficient(ANGLE_GAIN, Kp), *free)
+        form = Structure(name, free, {}, lambda c: entries(c[0], c[1:]), tuple(given))
+    else:
+        form = Structure(name, free, {ANGLE_GAIN: Kp}, lambda c: entries(Kp, c), tuple(given))
     if "root_moment" in form.signals:
         must_not_be_algebraic(arm, "structure", name)
     return form
@@ -213,7 +230,7 @@ def polynomial_of(*coefficients: Any) -> Real:
 
 ONE = np.ones((1, 1))
 # free coefficients, and their entries
-Built = tuple[Sequence[Coefficient], Callable[[Real], tuple[Entry, ...]]]
+Built = tuple[Sequence[Coefficient], Callable[[Any, Real], tuple[Entry, ...]]]
 
 
 class Declaration(NamedTuple):
@@ -251,7 +268,7 @@ def _pole(period: float) -> Coefficient:
     return positive_coefficient("pole_rad_s", 2 / period, 2 / period)
 
 
-def _servo(Kp: float, K1: Real) -> tuple[Entry, Entry]:
+def _servo(Kp: Any, K1: Real) -> tuple[Entry, Entry]:
     """Kp on the angle, K1 (laws,) on its rate."""
     return Entry("hub_angle", polynomial_of(Kp), ONE), Entry("hub_rate", polynomial_of(K1), ONE)
 
@@ -270,21 +287,21 @@ def _two_gains(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     K1 = Coefficient(PLANE[0], LOGARITHMIC * rate, (0.0, most), (0.0, np.inf), 0.1 * rate)
     K2 = Coefficient(PLANE[1], unit, (-3.0 * unit, unit), (-np.inf, unit), 0.0)
 
-    def entries(c: Real) -> tuple[Entry, ...]:
+    def entries(Kp: Any, c: Real) -> tuple[Entry, ...]:
         moment = Entry("root_moment", polynomial_of(c[1]), ONE)
-        return (*_servo(Kp, c[0])[0 if Kp else 1 :], moment)
+        return (*_servo(Kp, c[0])[0 if np.any(Kp) else 1 :], moment)
 
     return (K1, K2), entries
 
 
 @structure("PD", r"$v = -K_p \theta - K_1 \theta_t$")
 def _pd(arm: Arm, Kp: float, modes: int, period: float) -> Built:
-    return (_rate_gain(arm, Kp),), lambda c: _servo(Kp, c[0])
+    return (_rate_gain(arm, Kp),), lambda Kp, c: _servo(Kp, c[0])
 
 
 @structure("PD+notch", r"$v = -(K_p + K_1 s/(1 + s/p)) \, N(s) \, \theta$")
 def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Built:
-    def entries(c: Real) -> tuple[Entry, ...]:
+    def entries(Kp: Any, c: Real) -> tuple[Entry, ...]:
         K1, pole, w, a, b = c
         num = multiply_polynomials(polynomial_of(K1 + Kp / pole, Kp), _second_order(w, a))
         return (
@@ -303,7 +320,7 @@ def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Built:
 
 @structure("lead", r"$v = -K_p (1 + s/z)/(1 + s/p) \, \theta$")
 def _lead(arm: Arm, Kp: float, modes: int, period: float) -> Built:
-    def entries(c: Real) -> tuple[Entry, ...]:
+    def entries(Kp: Any, c: Real) -> tuple[Entry, ...]:
         zero, pole = c
         return (Entry("hub_angle", polynomial_of(Kp / zero, Kp), polynomial_of(1 / pole, 1.0)),)
 
@@ -313,12 +330,12 @@ def _lead(arm: Arm, Kp: float, modes: int, period: float) -> Built:
 @structure("PI", r"$v = -(K_p + K_i/s) \, \theta$, for a hub with friction or back-EMF")
 def _pi(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     den = polynomial_of(1.0, 0.0)
-    return (_integral_gain(arm, Kp),), lambda c: (Entry("hub_angle", polynomial_of(Kp, c[0]), den),)
+    return (_integral_gain(arm, Kp),), lambda Kp, c: (Entry("hub_angle", polynomial_of(Kp, c[0]), den),)
 
 
 @structure("PID", r"$v = -(K_p + K_i/s + K_d s/(1 + s/p)) \, \theta$")
 def _pid(arm: Arm, Kp: float, modes: int, period: float) -> Built:
-    def entries(c: Real) -> tuple[Entry, ...]:
+    def entries(Kp: Any, c: Real) -> tuple[Entry, ...]:
         Ki, Kd, pole = c
         num = polynomial_of(Kd + Kp / pole, Kp + Ki / pole, Ki)
         return (Entry("hub_angle", num, polynomial_of(1 / pole, 1.0, 0.0)),)
@@ -331,7 +348,7 @@ def _pid(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     r"PD, and $-\sum_i g_i \omega_i^2/(s^2 + 2 \zeta_i \omega_i s + \omega_i^2) \, M$ (positive position feedback)",
 )
 def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Built:
-    def entries(c: Real) -> tuple[Entry, ...]:
+    def entries(Kp: Any, c: Real) -> tuple[Entry, ...]:
         num = np.zeros((1, c.shape[1]))
         den = ONE
         for g, w, zeta in c[1:].reshape(modes, 3, -1):
@@ -355,7 +372,7 @@ def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Built:
 
 @structure("strain-rate", r"PD, and $-g s/(1 + s/p) \, M$")
 def _strain_rate(arm: Arm, Kp: float, modes: int, period: float) -> Built:
-    def entries(c: Real) -> tuple[Entry, ...]:
+    def entries(Kp: Any, c: Real) -> tuple[Entry, ...]:
         K1, g, pole = c
         return (*_servo(Kp, K1), Entry("root_moment", polynomial_of(g, 0.0), polynomial_of(1 / pole, 1.0)))
 

@@ -1,0 +1,228 @@
+"""Laws that meet requirements: least value of a quantity among them, found on models and examined by the exact loops.
+
+1. Differential evolution on a model of few modes minimises log q + w sum max(0, v), q a quantity of the loop and v the
+   violations: an exact penalty (Fletcher, Practical Methods of Optimization, 1987, sec. 12.3), whose minimum lies on the
+   limits where the weight w is above the multipliers.
+2. A simplex of Nelder and Mead minimises quantities of the slew, which is simulated with its converters.
+3. The result card of the exact loops has the last word.  What it has less than the model tightens the requirement on the
+   model, and the search goes on from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Annotated, Any, NamedTuple, cast
+
+import numpy as np
+from scipy.optimize import minimize
+
+from tfarm.arm import AnyLaw
+from tfarm.arrays import LEAST_SIZE, Real
+from tfarm.assessment.card import LoopCard, loop_card
+from tfarm.case import Case
+from tfarm.errors import ConvergenceError
+from tfarm.records import frozen
+from tfarm.schema import Quantity
+from tfarm.spectrum.table import first_frequency
+from tfarm.synthesis.measures import LoopMeasures
+from tfarm.synthesis.requirements import Requirement
+from tfarm.synthesis.slew_measures import SlewMeasures
+from tfarm.synthesis.structures import Entry
+from tfarm.synthesis.worst_case import NamedArm
+
+# ln |z| of a loop with the delay of its requirement, which counts as a violation of 1
+GROWTH_OF_DELAY = 0.05
+# of the scores, times a violation
+WEIGHT = 30.0
+# of the time constant, in the score of a settling time: it decides where the tip is at rest when the motion ends
+SHARE_OF_SPEED = 0.05
+
+
+@frozen
+class Goal:
+    """The least value of a quantity under requirements, as an objective of a judge.
+
+    `shifts` tighten each requirement of the sampled (0) and of the continuous-time loop (1) on the model.
+    """
+
+    requirements: tuple[Requirement, ...]
+    minimised: str
+    shifts: tuple[tuple[float, ...], tuple[float, ...]]
+
+    is_negated = False
+    of_slew = False
+    of_poles = True
+
+    @property
+    def by_simulation(self) -> bool:
+        """Whether a quantity of the slew is minimised or limited."""
+        names = (self.minimised, *(each.name for each in self.requirements))
+        return any(_is_of_slew(name) for name in names)
+
+    def tighter(self, shifts: Real) -> Goal:
+        """Return the goal with more (2, requirements) of each shift."""
+        more = np.array(self.shifts) + shifts
+        return Goal(self.requirements, self.minimised, (tuple(more[0].tolist()), tuple(more[1].tolist())))
+
+    def scores(self, judge: Any, entries: Sequence[Entry], poles: Any) -> Real:
+        """Return the scores of laws that are stable on the model (laws,)."""
+        sampled = LoopMeasures(judge.model, entries, poles, judge.chain.sampling.period)
+        if _is_of_slew(self.minimised):
+            value = sampled.dominant_time_constant(first_frequency(judge.arm))
+        else:
+            value = sampled.of(self.minimised)
+        return np.log(np.maximum(value, LEAST_SIZE)) + self._penalty(judge, sampled)
+
+    def _penalty(self, judge: Any, sampled: LoopMeasures) -> Real:
+        """The weighted violations of requirements on the loops (laws,)."""
+        total = np.zeros(sampled.L.shape[0])
+        loops = [sampled]
+        if judge.also:
+            other = judge.also[0]
+            needs_poles = any(each.name in ("time_constant_s", "least_damping") for each in self.requirements)
+            poles = other.poles(sampled.entries) if needs_poles else sampled.poles
+            loops.append(LoopMeasures(other, sampled.entries, poles, sampled.period))
+        for loop, shifts in zip(loops, self.shifts, strict=False):
+            for each, shift in zip(self.requirements, shifts, strict=True):
+                if each.measure.of_slew:
+                    continue
+                violation = each.violations(loop.of(each.name)) + shift
+                if each.name == "delay_margin_periods" and loop is sampled and judge.delayed:
+                    # the crossovers of L leave out how a late input changes what is read; these models have the shift
+                    growth = [of.growth(of.poles(sampled.entries)).max(axis=1) for of in judge.delayed]
+                    violation = np.maximum(violation, np.max(growth, axis=0) / GROWTH_OF_DELAY)
+                total += WEIGHT * np.maximum(violation, 0.0)
+        return total
+
+    def excess(self, judges: Sequence[Any], law: AnyLaw) -> float:
+        """Return the sum of violations of a law on the models, the largest of the arms, without shifts."""
+        plain = Goal(self.requirements, self.minimised, (self.none, self.none))
+        found = []
+        for judge in judges:
+            entries = judge.entries(law)
+            loop = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
+            found.append(float(plain._penalty(judge, loop)[0]) / WEIGHT)
+        return max(found)
+
+    @property
+    def none(self) -> tuple[float, ...]:
+        """No shift of any requirement."""
+        return (0.0,) * len(self.requirements)
+
+    def simulated_score(self, judge: Any, slew: SlewMeasures, law: AnyLaw, limit: float = np.inf) -> float:
+        """Return the score of one law with its slew; inf where it is unstable on the model."""
+        entries = judge.entries(law)
+        if any(model.growth(model.poles(entries)).max() >= 0 for model in (judge.model, *judge.also)):
+            return np.inf
+        measures = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
+        score = float(self._penalty(judge, measures)[0])
+        speed = float(measures.dominant_time_constant(first_frequency(judge.arm))[0])
+        figures = slew.of(law)
+        if self.minimised == "settling_time_s":
+            score += float(np.log(figures[self.minimised] + SHARE_OF_SPEED * speed))
+        elif _is_of_slew(self.minimised):
+            score += float(np.log(max(figures[self.minimised], LEAST_SIZE)))
+        else:
+            score += float(np.log(max(float(measures.of(self.minimised)[0]), LEAST_SIZE)))
+        for each, shift in zip(self.requirements, self.shifts[0], strict=True):
+            if each.measure.of_slew:
+                score += WEIGHT * max(each.violation(figures[each.name]) + shift, 0.0)
+        return score
+
+    def value(self, judge: Any, law: AnyLaw) -> float:
+        """Return the quantity of a law, by the best available method."""
+        return exact_values(judge.case(law), slew_of(judge)).sampled[self.minimised]
+
+
+def _is_of_slew(name: str) -> bool:
+    return Requirement(name, "<=", 1.0).measure.of_slew
+
+
+def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real) -> tuple[float, Real]:
+    """Return the score and the point of a simplex that begins at x, with the slew simulated on every arm."""
+    slews = [slew_of(judge) for judge in judges]
+
+    def score(at: Real) -> float:
+        law = form.record_at(at)
+        return max(goal.simulated_score(judge, slew, law) for judge, slew in zip(judges, slews, strict=True))
+
+    low, high = form.box
+    edges = np.diag(np.where(x + 0.02 * (high - low) > high, -1.0, 1.0) * 0.02 * (high - low))
+    options = {"initial_simplex": [x, *(x + edges)], "maxfev": 60 * form.size, "adaptive": form.size > 2}
+    done = cast("Any", minimize)(score, x, method="Nelder-Mead", bounds=np.transpose(form.box), options=options)
+    return float(done.fun), np.asarray(done.x)
+
+
+def slew_of(judge: Any) -> SlewMeasures:
+    """Return the slew of a judge's arm, by as many modes as its model of the sampled loop has."""
+    return SlewMeasures(judge.arm, judge.known, judge.chain, 8)
+
+
+class LoopValues(NamedTuple):
+    """Exact values of the measures by name, of the sampled and the continuous-time loop, None of a law in z."""
+
+    sampled: dict[str, float]
+    continuous: dict[str, float] | None
+
+
+def _values_of(card: LoopCard) -> dict[str, float]:
+    """The measures of a card, the worst value of what is not defined."""
+    gain = [each.value for each in (card.gain_margin, card.gain_reduction)]
+    damping = card.least_damping
+    return {
+        "gain_margin_db": -np.inf if None in gain else min(cast("list[float]", gain)),
+        "phase_margin_deg": _or(card.phase_margin.value, -np.inf),
+        "delay_margin_periods": _or(card.delay_margin_periods, -np.inf),
+        "peak_sensitivity": _or(card.peak_sensitivity.value, np.inf),
+        "disk_margin": _or(card.disk_margin, -np.inf),
+        "least_damping": -np.inf if card.stability != "stable" else 1.0 if damping is None else float(damping.ratio),
+        "time_constant_s": _or(card.time_constant, np.inf),
+    }
+
+
+def _or(value: float | None, other: float) -> float:
+    return other if value is None else float(value)
+
+
+@lru_cache(256)
+def exact_values(case: Case, slew: SlewMeasures | None) -> LoopValues:
+    """Return the measures of both loops of a case by the result card, and of the slew where it is given."""
+    found: list[dict[str, float] | None] = []
+    for name in ("sampled", "continuous"):
+        if name == "continuous" and case.law.is_discrete:
+            found.append(None)
+            continue
+        try:
+            found.append(_values_of(loop_card(name, case)))
+        except ConvergenceError:
+            found.append({})
+    sampled = found[0] or {}
+    if slew is not None:
+        sampled = {**sampled, **slew.of(case.law)}
+    return LoopValues(sampled, found[1])
+
+
+class Checked(NamedTuple):
+    """A requirement with the exact values of a law on an arm, and its violation, the larger of the two loops."""
+
+    requirement: Annotated[str, Quantity("requirement", help="as after --require")]
+    arm: Annotated[str, Quantity("arm", help="the arm")]
+    sampled: Annotated[float | None, Quantity("sampled", digits=4, help="exact value of the sampled loop")]
+    continuous: Annotated[float | None, Quantity("continuous-time", digits=4, help="of the continuous-time loop")]
+    violation: Annotated[float, Quantity("violation", digits=2, help="excess over the limit in units of the limit")]
+
+
+def check(goal: Goal, judge: Any, named: NamedArm, law: AnyLaw) -> tuple[list[Checked], Real]:
+    """Return the requirements with the exact values of a law on an arm, and violations (2, requirements) of the loops."""
+    values = exact_values(Case(named.arm, law, judge.chain), slew_of(judge) if goal.by_simulation else None)
+    rows = []
+    violations = np.full((2, len(goal.requirements)), -1.0)
+    for n, each in enumerate(goal.requirements):
+        shown = [None if of is None else of.get(each.name) for of in values]
+        for loop, value in enumerate(shown):
+            known = values[loop] is not None and not (loop and each.measure.of_slew)
+            if known:
+                violations[loop, n] = np.inf if value is None else each.violation(value)
+        rows.append(Checked(str(each), named.name, shown[0], shown[1], float(violations[:, n].max())))
+    return rows, violations

@@ -1,0 +1,105 @@
+"""Margins, damping and speed of many laws at once, on a model of few modes: measures of a search.
+
+They are those of the result card, between two points of the grid along straight lines, so that a search is quick; the
+law found is examined by the exact loops, which correct what the model leaves out (`tfarm.synthesis.goals`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from tfarm.arrays import LEAST_SIZE, Complex, Real
+from tfarm.records import frozen
+from tfarm.synthesis.judge import damping_of, delay
+from tfarm.synthesis.models import DesignModel
+from tfarm.synthesis.structures import Entry
+
+
+@frozen
+class LoopMeasures:
+    """The measures of laws on a model: `entries` of laws, their closed-loop `poles` (laws, n) where these are known."""
+
+    model: DesignModel
+    entries: Sequence[Entry]
+    poles: Complex
+    period: float
+
+    @cached_property
+    def L(self) -> Complex:
+        """The loop function (laws, m) on the grid."""
+        return self.model.loop(self.entries)
+
+    def gain_margin_db(self) -> Real:
+        """Return the least factor on the loop gain [dB], up or down, that brings L to -1 (laws,)."""
+        size = abs(self.L)
+        real = self.L.real
+        imag = self.L.imag
+        change = np.diff(imag, axis=1)
+        crosses = (imag[:, 1:] * imag[:, :-1] <= 0) & (change != 0)
+        share = -imag[:, :-1] / np.where(crosses, change, 1.0)
+        at = real[:, :-1] + share * np.diff(real, axis=1)
+        # through a pole L passes infinity, and the line between the points not the value of L
+        passes = crosses & (at < 0) & (-at > 0.1 * np.minimum(size[:, 1:], size[:, :-1]))
+        return 20 * np.where(passes, abs(np.log10(np.maximum(-at, LEAST_SIZE))), np.inf).min(axis=1)
+
+    def phase_margin_deg(self) -> Real:
+        """Return the least distance [deg] of L from -1 where abs(L) passes 1 (laws,)."""
+        size = np.log(np.maximum(abs(self.L), LEAST_SIZE))
+        turn = np.pi + np.unwrap(np.angle(self.L))
+        change = np.diff(size)
+        passes = (size[:, 1:] * size[:, :-1] <= 0) & (change != 0)
+        share = size[:, :-1] / np.where(passes, -change, 1.0)
+        late = np.mod(turn[:, :-1] + share * np.diff(turn), 2 * np.pi)
+        return np.degrees(np.where(passes, np.minimum(late, 2 * np.pi - late), np.inf).min(axis=1))
+
+    def delay_margin_periods(self) -> Real:
+        """Return the delay margin in sampling periods (laws,)."""
+        return delay(self.model, self.L) / self.period
+
+    def peak_sensitivity(self) -> Real:
+        """Return the largest abs(S) on the grid (laws,)."""
+        least = 0.0 if self.model.period is not None else 1.0
+        return np.maximum(1 / np.maximum(abs(1 + self.L).min(axis=1), LEAST_SIZE), least)
+
+    def disk_margin(self) -> Real:
+        """Return the least 2 abs(1 + L)/abs(1 - L) (laws,)."""
+        return (2 * abs(1 + self.L) / np.maximum(abs(1 - self.L), LEAST_SIZE)).min(axis=1)
+
+    def least_damping(self) -> Real:
+        """Return the least damping ratio of the oscillating poles (laws,)."""
+        return damping_of(self.model, self.poles)
+
+    def time_constant_s(self) -> Real:
+        """Return the time constant [s] of the slowest pole of stable loops (laws,)."""
+        if self.model.period is not None:
+            rate = -np.log(np.maximum(abs(self.poles).max(axis=1), LEAST_SIZE)) / self.model.period
+        else:
+            rate = -self.poles.real.max(axis=1)
+        return 1 / np.maximum(rate, LEAST_SIZE)
+
+    def dominant_time_constant(self, first: float) -> Real:
+        """Return the time constant [s] of the slowest pole below twice the `first` frequency [rad/s] (laws,).
+
+        Modes above ring on at their own small damping, which no law of few coefficients changes; where no pole is
+        below, the nearest to 0 counts.
+        """
+        s = self.model.in_s(self.poles) / (self.model.period or 1.0)
+        counted = np.ones(s.shape, dtype=bool)
+        rows = np.arange(len(s))
+        for own in self.model.higher:
+            # of sampled modes that alias to lower frequencies
+            gap = np.where(counted & (self.poles.imag >= 0), abs(self.poles - own), np.inf)
+            counted[rows, gap.argmin(axis=1)] = False
+        counted &= (s.imag >= 0) & (self.poles != 0)
+        size = np.where(counted, abs(s), np.inf)
+        reach = np.maximum(2.0 * first, size.min(axis=1, keepdims=True))
+        rate = np.where(size <= reach, -s.real, np.inf).min(axis=1)
+        return 1 / np.maximum(rate, LEAST_SIZE)
+
+    def of(self, name: str) -> Real:
+        """Return the measure of that name (laws,)."""
+        measure: Callable[[], Real] = getattr(self, name)
+        return measure()

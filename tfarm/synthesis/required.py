@@ -1,0 +1,204 @@
+"""Search for the law that meets requirements on all arms, and the reasons where none of a structure does.
+
+What the exact loops have less than the models tightens the requirements of the next search; four of these are enough.
+Where no law meets them all, the law with the least violations is returned, with the requirements that conflict: those
+without which the others are met.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from tfarm.arm import AnyLaw, Arm
+from tfarm.arrays import Real
+from tfarm.assessment.card import graded_arm
+from tfarm.dsp import Chain
+from tfarm.errors import ConvergenceError
+from tfarm.records import frozen
+from tfarm.schema import Quantity
+from tfarm.synthesis.goals import Checked, Goal, check, polished
+from tfarm.synthesis.judge import LOST, Judge, judge_of, model_sizes
+from tfarm.synthesis.measures import LoopMeasures
+from tfarm.synthesis.models import sampled_model
+from tfarm.synthesis.requirements import Requirement
+from tfarm.synthesis.search import Search, Worst, search
+from tfarm.synthesis.structures import Structure
+from tfarm.synthesis.worst_case import Effort, NamedArm, Tell
+
+# of a violation on the models: less is met after a search that goes on
+MET = 1e-3
+
+
+class RequiredLaw(NamedTuple):
+    """A law found for some arms, its goal with shifts, and the requirements with exact values on each arm."""
+
+    worst: Worst
+    search: Search
+    score: float
+    x: Real
+    law: AnyLaw
+    goal: Goal
+    checked: tuple[Checked, ...]
+
+    @property
+    def violation(self) -> float:
+        """The largest violation on any arm, 0 where all requirements are met; inf of an unstable loop."""
+        return max((each.violation for each in self.checked), default=0.0)
+
+
+class Sensitivity(NamedTuple):
+    """The change of a required quantity with a coefficient."""
+
+    requirement: Annotated[str, Quantity("requirement", help="as after --require")]
+    coefficient: Annotated[str, Quantity("coefficient", help="a number of the law")]
+    change: Annotated[
+        float, Quantity("change per 1 %", digits=3, help="of the quantity, sampled loop, per 1 % of the coefficient")
+    ]
+
+
+@frozen
+class RequirementTask:
+    """A search for the least `minimised` quantity under requirements by a structure; slews are those of `arm`."""
+
+    arm: Arm
+    requirements: tuple[Requirement, ...]
+    minimised: str
+    form: Structure
+    modes: int
+    chain: Chain
+    tell: Tell
+
+    @property
+    def goal(self) -> Goal:
+        """The goal without shifts."""
+        none = (0.0,) * len(self.requirements)
+        return Goal(self.requirements, self.minimised, (none, none))
+
+    def judge(self, on: Arm, goal: Goal, step: int) -> Judge:
+        """Return the judge of laws on an arm by the models of a step of their sizes, with the delays required.
+
+        An arm without damping has that with which its card is graded.
+        """
+        graded, _ = graded_arm(on)
+        sizes = model_sizes(graded, self.chain, self.modes, continuous=False)
+        count = sizes[min(step, len(sizes) - 1)]
+        found = judge_of(graded, self.arm, self.chain, goal, self.form.signals, self.modes, count)
+        if graded is not on:
+            # the loop of the arm as it is has to be stable
+            most = model_sizes(on, self.chain, self.modes, continuous=False)[0]
+            own = judge_of(on, self.arm, self.chain, goal, self.form.signals, self.modes, most)
+            found = replace(found, also=(*found.also, own.model, *own.also))
+        sampling = found.chain.sampling
+        delays = [
+            # a little more, so that the exact margin is not below the limit by its rounding
+            share * each.limit * (1.0005 + shift) + sampling.delay_samples
+            for each, shift in zip(self.requirements, goal.shifts[0], strict=True)
+            for share in (1 / 3, 2 / 3, 1.0)
+            if each.name == "delay_margin_periods"
+        ]
+        chains = [replace(found.chain, sampling=replace(sampling, delay_samples=each)) for each in delays]
+        signals = found.model.signals
+        delayed = tuple(sampled_model(found.arm, each, signals, self.modes, count) for each in chains)
+        return replace(found, delayed=delayed)
+
+    def find(self, named: Sequence[NamedArm], before: RequiredLaw | None, effort: Effort) -> RequiredLaw:
+        """Return the best law for all arms, near the one found `before`, if any.
+
+        Raises ConvergenceError where no law is stable on all arms.
+        """
+        goal = self.goal if before is None else before.goal
+        form = self.form if before is None else before.search.form
+        near = None if before is None else before.x
+        best: RequiredLaw | None = None
+        step = 0
+        for attempt in range(6):
+            judges = tuple(self.judge(each.arm, goal, step) for each in named)
+            found = search(Worst(judges[::-1]), form, self.tell, near, effort if attempt == 0 else "near")
+            score, x = found.found[0]
+            form = found.form
+            if score >= LOST:
+                break
+            if goal.by_simulation and effort != "sketch":
+                score, x = polished(goal, judges, form, x)
+            law = form.record_at(x)
+            if effort == "sketch":
+                return RequiredLaw(Worst(judges), found, score, x, law, goal, ())
+            rows = []
+            violations = np.full((2, len(self.requirements)), -1.0)
+            for each, judge in zip(named, judges, strict=True):
+                own, exact = check(goal, judge, each, law)
+                rows += own
+                violations = np.maximum(violations, exact)
+            chosen = RequiredLaw(Worst(judges), found, score, x, law, goal, tuple(rows))
+            if best is None or chosen.violation < best.violation:
+                best = chosen
+            if chosen.violation <= 0 or goal.excess(judges, law) > MET:
+                break
+            if not np.isfinite(violations).all():
+                # unstable by a mode that the models leave out
+                if step + 1 >= max(len(model_sizes(each.arm, self.chain, self.modes, continuous=False)) for each in named):
+                    break
+                step += 1
+                continue
+            near = x
+            goal = goal.tighter(np.where(violations > 0, 1.1 * violations + 1e-5, 0.0))
+        if best is None or not np.isfinite(best.violation):
+            law = None if best is None else best.law
+            raise ConvergenceError("no law of the structure is stable on all arms", law, None)
+        return best
+
+    def score_on(self, choice: RequiredLaw, on: Arm) -> float:
+        """Return the score of a law on another arm; inf where the loop is unstable."""
+        score = self.judge(on, choice.goal, 0).score(choice.law)
+        return score if score < LOST else np.inf
+
+    def without(self, name: str) -> RequirementTask:
+        """Return the task without the requirement of this name."""
+        return replace(self, requirements=tuple(each for each in self.requirements if each.name != name))
+
+    def conflicts(self, choice: RequiredLaw, named: Sequence[NamedArm]) -> tuple[str, ...]:
+        """Return the requirements without which the others are met, near a law that does not meet them all."""
+        found = []
+        for each in self.requirements:
+            task = self.without(each.name)
+            judges = tuple(task.judge(of.arm, task.goal, 0) for of in named)
+            result = search(Worst(judges[::-1]), choice.search.form, self.tell, choice.x, "near")
+            law = result.form.record_at(result.found[0][1])
+            if task.goal.excess(judges, law) <= MET:
+                found.append(str(each))
+        return tuple(found)
+
+    def sensitivities(self, choice: RequiredLaw) -> list[Sensitivity]:
+        """Return the changes of the required quantities of the sampled loop by the model of the first arm."""
+        judge = choice.worst.judges[0]
+        form = choice.search.form
+        at = form.coefficients(choice.x[:, None])
+        change = 0.001
+        found = []
+        for n, coefficient in enumerate(form.names):
+            c = np.repeat(at, 2, axis=1)
+            c[n] *= (1 + change, 1 - change)
+            entries = form.entries(c)
+            loop = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
+            for each in self.requirements:
+                if not each.measure.of_slew:
+                    values = loop.of(each.name)
+                    slope = float(values[0] - values[1]) / (2 * change) / 100
+                    found.append(Sensitivity(str(each), coefficient, slope))
+        return found
+
+
+def is_active(checked: Checked) -> bool:
+    """Whether a requirement limits a law: less than two per cent of its limit are left."""
+    # of the limit
+    slack = 0.02
+    return checked.violation > -slack
+
+
+def names_of(rows: Sequence[Checked], test: Any) -> list[str]:
+    """Return the requirements of the rows that pass a test, each once."""
+    return list(dict.fromkeys(each.requirement for each in rows if test(each)))

@@ -1,0 +1,136 @@
+"""Requirements on a loop: limits of the quantities of result card and step, by their names or short forms.
+
+A requirement is a quantity, a sense and a limit, "phase_margin_deg >= 45" or "PM>=45".  Those of the card hold for the
+sampled loop, and for the continuous-time one where the law is in s; those of the slew for the sampled loop, which runs.
+`GOOD` are the limits of the grade *good*: 6 dB, 45 deg, Ms = 2 and one sampling period.
+
+The violation of a requirement is its excess over the limit in units of that limit, so that 10 % too little phase counts
+as much as 10 % too high a peak.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Literal, NamedTuple, cast
+
+import numpy as np
+
+from tfarm.arrays import Real
+from tfarm.errors import ParameterError, must_be_known, require
+from tfarm.schema import Quantity
+
+Sense = Literal[">=", "<="]
+
+
+class Measure(NamedTuple):
+    """A quantity that a requirement limits: its title, unit, short forms, and the sense of a good value.
+
+    `scale` is the size [unit] of a violation of 1 where the limit is 0; a percentage is read as a share.
+    """
+
+    title: str
+    unit: str
+    short: tuple[str, ...]
+    sense: Sense
+    scale: float = 1.0
+    of_slew: bool = False
+    is_share: bool = False
+
+
+MEASURES = {
+    "gain_margin_db": Measure("gain margin", "dB", ("GM", "gain_margin"), ">="),
+    "phase_margin_deg": Measure("phase margin", "deg", ("PM", "phase_margin"), ">="),
+    "delay_margin_periods": Measure("delay margin", "periods", ("delay", "delay_margin"), ">="),
+    "peak_sensitivity": Measure("peak sensitivity", "", ("Ms", "sensitivity"), "<="),
+    "disk_margin": Measure("disk margin", "", ("disk",), ">="),
+    "least_damping": Measure("least damping ratio", "", ("damping",), ">=", 0.01, is_share=True),
+    "time_constant_s": Measure("dominant time constant", "s", ("time-constant", "time_constant"), "<="),
+    "settling_time_s": Measure("settling time of the tip", "s", ("settling",), "<=", 0.1, of_slew=True),
+    "overshoot": Measure("overshoot of the tip", "", ("overshoot",), "<=", 0.01, of_slew=True, is_share=True),
+    "residual_moment": Measure("residual root moment", "N m", ("residual",), "<=", of_slew=True),
+    "peak_input": Measure("largest input", "of the arm", ("torque", "input"), "<=", of_slew=True),
+}
+_NAMES = {word: key for key, each in MEASURES.items() for word in (key, *each.short)}
+
+
+class Requirement(NamedTuple):
+    """A limit of a quantity, in its unit; `sense` says which side of it is allowed."""
+
+    name: Annotated[str, Quantity("requirement", key="name", help="quantity of the card or of the slew")]
+    sense: Annotated[Sense, Quantity(help="side of the limit that is allowed")]
+    limit: Annotated[float, Quantity("limit", digits=4, help="in the unit of the quantity")]
+
+    @property
+    def measure(self) -> Measure:
+        """The quantity."""
+        return MEASURES[self.name]
+
+    def violations(self, values: Real) -> Real:
+        """Return the excess over the limit in units of the limit, negative where the requirement is met, at least -1."""
+        size = abs(self.limit) or self.measure.scale
+        sign = 1.0 if self.sense == ">=" else -1.0
+        excess = sign * (self.limit - np.asarray(values, dtype=float)) / size
+        return np.maximum(np.nan_to_num(excess, nan=np.inf, posinf=np.inf, neginf=-1.0), -1.0)
+
+    def violation(self, value: float) -> float:
+        """Return the excess of one value."""
+        return float(self.violations(np.float64(value)))
+
+    def __str__(self) -> str:
+        """As it is written in a file or after --require."""
+        measure = self.measure
+        value = f"{100 * self.limit:g}%" if measure.is_share else f"{self.limit:g}"
+        return f"{measure.short[0]}{self.sense}{value}"
+
+
+GOOD = (
+    Requirement("gain_margin_db", ">=", 6.0),
+    Requirement("phase_margin_deg", ">=", 45.0),
+    Requirement("delay_margin_periods", ">=", 1.0),
+    Requirement("peak_sensitivity", "<=", 2.0),
+)
+
+
+def measure_named(word: str, key: str) -> str:
+    """Return the name of the quantity with this name or short form.  Raises ParameterError for an unknown one."""
+    must_be_known(key, word, _NAMES)
+    return _NAMES[word]
+
+
+def requirements_of(wanted: str | Mapping[str, float | str] | Sequence[Requirement]) -> tuple[Requirement, ...]:
+    """Return the requirements of a text, a table, or a sequence of them.
+
+    A text is a list such as "GM>=6, PM>=45, damping>=2%"; "good" stands for the limits of the grade.  A table has a limit
+    for each name, {"phase_margin": 45}; its sense is that of a good value.
+    Raises ParameterError for an unknown name, a limit that is no finite number, and the sense that is never good.
+    """
+    if isinstance(wanted, str):
+        texts = [each.strip() for each in wanted.split(",")]
+        found = [each for text in texts for each in (GOOD if text == "good" else (_of_text(text),))]
+    elif isinstance(wanted, Mapping):
+        found = [_of_text(f"{name}{MEASURES[measure_named(name, 'require')].sense}{limit}") for name, limit in wanted.items()]
+    else:
+        found = list(wanted)
+    last = {each.name: each for each in found}
+    return tuple(last.values())
+
+
+def _of_text(text: str) -> Requirement:
+    """Return the requirement of one text."""
+    form = "a quantity, >= or <=, and a number, such as PM>=45 or damping>=2%"
+    parts = re.fullmatch(r"\s*([\w-]+)\s*(>=|<=)\s*([-+.\deE]+)\s*(%?)\s*", text)
+    if parts is None:
+        raise ParameterError(key="require", value=text, remedy=form)
+    word, sense, number, percent = parts.groups()
+    name = measure_named(word, "require")
+    measure = MEASURES[name]
+    require(sense == measure.sense, "require", text, f"{measure.title} is limited by {measure.sense}")
+    require(not percent or measure.is_share, "require", text, f"{measure.title} is in {measure.unit or 'units of 1'}")
+    try:
+        limit = float(number) / (100.0 if percent else 1.0)
+    except ValueError:
+        raise ParameterError(key="require", value=text, remedy=form) from None
+    require(math.isfinite(limit), "require", text, form)
+    return Requirement(name, cast("Sense", sense), limit)
