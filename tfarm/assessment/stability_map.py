@@ -18,11 +18,11 @@ from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
 from tfarm.loop.circle_crossings import (
     GainMap,
+    add_columns,
     ends_of_K1,
-    rounded_map,
+    refine_map,
     sampled_map,
     with_both_sides,
-    with_more,
 )
 from tfarm.loop.plane import (
     Axis,
@@ -104,7 +104,7 @@ def stable_regions(case: Case) -> StableRegions:
 
     planes = [outline_region(loop, across[(low <= across) & (top >= across)], cut, drawn) for loop in loops]
     every = np.unique(np.concatenate([plane.x for plane in planes]))
-    return StableRegions(gain_map(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
+    return StableRegions(gain_map(arm, every, cut), tuple(add_columns(plane, every) for plane in planes))
 
 
 @lru_cache(maxsize=8)
@@ -124,7 +124,7 @@ def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GainMap | None:
 
 def outline_region(loop: Sampled, across: Real, up: Real, drawn: Callable[[Real, Real], Complex]) -> GainMap:
     """Return the sampled region cut at these K1, and between them where its outline as it is `drawn` has corners."""
-    return rounded_map(sampled_map(loop, across, up), drawn)
+    return refine_map(sampled_map(loop, across, up), drawn)
 
 
 # ------------------------------------------------------------ the map

@@ -13,7 +13,7 @@ from tfarm.assessment.stability_map import DESIGNED_MODES
 from tfarm.digits import plain, significant
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError
-from tfarm.loop.loci import Loci, held_branches
+from tfarm.loop.loci import Loci, round_branches
 from tfarm.loop.margins import Margins
 from tfarm.loop.nyquist import Nyquist
 from tfarm.loop.plane import DEEPEST_MOMENT_GAIN
@@ -257,7 +257,7 @@ def locus_data(data: Loci) -> Sequence[Column]:
                 f"{which}_{n}_{part}", of=["" if math.isnan(value) else value for value in values.tolist()]
             )
             for which, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches))
-            for n, row in enumerate(held_branches(branches))
+            for n, row in enumerate(round_branches(branches))
             for part, values in (("re", row.real), ("im", row.imag))
         ),
     ]
