@@ -284,26 +284,18 @@ def grid(arm: Arm, up_to: float) -> Any:
 
     The array is read-only.
     """
-    # distances from a steep place, as shares of its frequency
-    nearest_to_steep = 1e-10
-    farthest_from_steep = 0.06
-    # of a grid on either side of a steep place, one and a half a decade
-    points_near_steep = 14
-    # and between two of them
-    points_between_steep = 24
-    # of the end of a grid: the points of steep places up to there reach below it
-    steep_beyond = 1.05
-    # from there to that place, ten a decade
-    points_below_steep = 60
-    places = np.asarray(steep_places(arm, steep_beyond * up_to))
-    lowest = SLOWEST * min(up_to, places[0] if places.size else up_to)
-    away = np.geomspace(nearest_to_steep, farthest_from_steep, points_near_steep)
+    # the points of steep places up to 1.05 times the end of a grid reach below it
+    places = np.asarray(steep_places(arm, 1.05 * up_to))
+    lowest = SLOWEST * min([up_to, *places[:1]])
+    # distances from a steep place to either side, as shares of its frequency, one and a half a decade
+    away = np.geomspace(1e-10, 0.06, 14)
     close = (places[:, None] * (1 + np.r_[-away[::-1], away])).ravel()
     corners = np.r_[lowest, places[places < up_to], up_to]
-    between = np.concatenate(
-        [np.linspace(a, b, points_between_steep, endpoint=False) for a, b in itertools.pairwise(corners)]
-    )
-    slow = np.geomspace(lowest, corners[1], points_below_steep)
+    # 24 points between two of them
+    pairs = itertools.pairwise(corners)
+    between = np.concatenate([np.linspace(low, high, 24, endpoint=False) for low, high in pairs])
+    # ten a decade up to the first of them
+    slow = np.geomspace(lowest, corners[1], 60)
     omega = np.unique(np.concatenate([close, between, slow]))
     omega = np.append(omega[(omega >= lowest) & (omega < up_to)], up_to)
     omega.flags.writeable = False

@@ -105,7 +105,7 @@ class LoopCurve:
 
     @property
     def curve(self) -> LoopCurve:
-        """Itself, as the curve of what has one."""
+        """Itself, as the curve of a record that has one."""
         return self
 
     @property
@@ -115,7 +115,7 @@ class LoopCurve:
 
 
 class LoopContour(NamedTuple):
-    """What Nyquist's criterion reads of a loop: its contour runs up the curve, and closes through points `closing`.
+    """Data of a loop for Nyquist's criterion: its contour runs up the curve, and closes through points `closing`.
 
     `grid` are frequencies [rad/s] that resolve L, `on_curve` those of the poles of L on the curve, `closed` the
     closed-loop poles s [1/s], Im s >= 0, apart from those at rest.  `unstable_open` poles of L are unstable, and

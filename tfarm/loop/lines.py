@@ -141,9 +141,9 @@ class Along(NamedTuple):
 def cross_axis(
     arm: Arm, terms: LawTerms, band: float, loops: Sequence[Along]
 ) -> Iterator[Callable[[], Crossings]]:
-    """Return for each line what makes its crossings of the axis, between its limits.
+    """Yield for each line a function that returns its crossings of the axis, between its limits.
 
-    It raises ConvergenceError where poles meet at s = 0 that cannot be counted.
+    That raises ConvergenceError where poles meet at s = 0 that cannot be counted.
     """
     # of w1: where the order of a zero at s = 0 is read off
     order_read_at = (2e-3, 1e-3)

@@ -85,7 +85,7 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
     else:
         # 9 values at which an arm is reduced anew, where a parameter of it varies
         which = np.unique(np.linspace(0, exact.gain.size - 1, 9).round().astype(int))
-        arms = [exact.varied.at(float(value)).arm for value in exact.gain[which]]
+        arms = [exact.varied.at(value).arm for value in exact.gain[which].tolist()]
         models = [_closed_model(each, exact.gains, count, HubFeedback())[0] for each in arms]
         poles = np.array([np.linalg.eigvals(A) for A, *_ in models])
     branches = exact.branches[:, which]
@@ -170,9 +170,10 @@ def most_damped(found: Locus) -> MostDamped | None:
 
         # 1e-7 of the gain: a damping ratio, flat there, is known to 1e-14 of its curvature
         low, middle, high = gain.tolist()
-        ends = (low, high)
         known = 1e-7 * abs(middle)
-        least = minimize_scalar(negative_ratio, bounds=ends, method="bounded", options={"xatol": known})
+        least = minimize_scalar(
+            negative_ratio, bounds=(low, high), method="bounded", options={"xatol": known}
+        )
         best = (float(least.x), -float(least.fun))
     return MostDamped(*best, bool((first[at:].imag > 0).all()), found.varied.title)
 
@@ -274,7 +275,7 @@ def round_branches(branches: Complex) -> Complex:
 
 
 def loci(case: Case, vary: str, start: float, stop: float) -> Loci:
-    """Return both loci of one gain.  Raises what `locus` and `reduced_locus` raise."""
+    """Return both loci of one gain.  Raises as `locus` and `reduced_locus` do."""
     locus_branches = 7
     exact = locus(case.arm, case.law, vary, start, stop, LOCUS_POINTS, locus_branches)
     return Loci(exact, reduced_locus(exact))
