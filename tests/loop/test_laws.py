@@ -20,10 +20,11 @@ from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
 from tfarm.case import Case
 from tfarm.loop.lines import through_infinity, with_numbers
 from tfarm.loop.nyquist import nyquist_of
-from tfarm.loop.plane import cell_middles, plane
+from tfarm.loop.plane import plane
+from tfarm.loop.plane_axes import cell_middles
 from tfarm.loop.poles import poles_below
 from tfarm.loop.sampled_verdict import sampled_verdict
-from tfarm.loop.stability import Spill
+from tfarm.loop.spillover import Spill
 from tfarm.loop.theorem import cancel_hub_moment, definite, exact_polynomial, is_hurwitz, on_axis, signs_of
 from tfarm.reduced.modal import closed_loop_matrix, sensed_model
 from tfarm.response.signals import Signals
