@@ -270,7 +270,8 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
             return None
 
     # poles may enter or leave the band through its top, between the corners
-    if not is_quiet or any(part in name for part in not_affine for name in vary):
+    is_affine = not any(part in name for part, name in itertools.product(not_affine, vary))
+    if not (is_quiet and is_affine):
         reach = f"{band:.4g} rad/s"
         remedy = f"some cross the end of the frequency range, {reach}; ask for a smaller range of values"
         done.must_agree(count_at, remedy)
@@ -296,7 +297,7 @@ def loop_at(loop: ContinuousLoop, vary: tuple[str, str], point: tuple[float, ...
 
 
 def _is_known_everywhere(loop: ContinuousLoop) -> bool:
-    """Whether a theorem decides every mode for any K1 and K2."""
+    """Return whether a theorem decides every mode for any K1 and K2."""
     return loop.is_moved_at_hub_alone and loop.arm.reads_hub_moment and not loop.arm.input_lags
 
 

@@ -118,7 +118,7 @@ class Sampled(Loop):
         return any(self.weights)
 
     def place(self, name: str) -> int | None:
-        """The part whose weight is a number, by its name in `Law.having`; None of any other number."""
+        """Return the part whose weight is a number, by its name in `Law.having`; None of any other number."""
         known = self.unit_law.part_gains
         name = OUTPUT_OF.get(name, name).removesuffix(".gain")
         return next((known[key][0] for key in (name, f"{name}.gain") if key in known), None)
@@ -273,7 +273,7 @@ class Sampled(Loop):
 
 
 class OfLoop:
-    """What a record of a sampled loop has of that loop."""
+    """Properties of the loop in a record of a sampled loop."""
 
     loop: Sampled
 

@@ -165,7 +165,7 @@ class Analysis(LoopAnalysis):
         return found
 
     def interval(self, name: str) -> Window | None:
-        """The stability interval around a gain; a gain of 0 on a free angle is the end of its own interval."""
+        """Return the stability interval around a gain; a gain of 0 on a free angle is the end of its own interval."""
         value = self.loop.number(name)
         windows = self.windows[name]
         if name == ANGLE_GAIN and value == 0.0 and self.verdict.is_stable:

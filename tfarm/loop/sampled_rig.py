@@ -139,7 +139,7 @@ class SampledRig:
 
     @cached_property
     def frame(self) -> tuple[Real, Real]:
-        """The matrix without feedback, and what the input adds to its states."""
+        """The matrix without feedback, and the column of the input."""
         A, B, C = self.pulse.matrices()
         own, Bk, _, _ = self.in_z.matrices
         return np.block([[A, np.zeros((len(A), len(own)))], [Bk @ C, own]]), np.r_[B, np.zeros(len(own))]

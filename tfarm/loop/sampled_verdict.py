@@ -259,7 +259,7 @@ class Verdict(OfLoop, LoopVerdict):
         return stable_windows(self.loop, FACTOR)
 
     def gain_limits(self, by_phase: tuple[PhaseCrossover, ...]) -> tuple[float, float]:
-        """Return the stability interval of that factor, or what the phase crossovers show."""
+        """Return the stability interval of that factor, or that of the phase crossovers."""
         return interval_around(self.factors, 1.0) or next_limits(t for _, t in by_phase)
 
 

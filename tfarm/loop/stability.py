@@ -149,7 +149,7 @@ class Stability(LoopVerdict):
 
     @property
     def range_words(self) -> str:
-        """The range in which poles are counted, and what is known beyond."""
+        """The range in which poles are counted, and certainty beyond."""
         if self.tail == SMALL_GAIN:
             known = ", small gain beyond"
         elif self.is_known_beyond:
@@ -310,7 +310,7 @@ def _word_of(poles: Poles, is_infinite: bool) -> str:
 
 
 def is_controllable(arm: Arm, up_to: float) -> bool:
-    """Whether the hub takes part in every flexible mode below `up_to` [rad/s], by rotation or by root moment.
+    """Return whether the hub takes part in every flexible mode below `up_to` [rad/s], by rotation or by root moment.
 
     At C = 0 a mode without the hub stays undamped under any law: exceptional arms have one.
     """
@@ -370,7 +370,7 @@ def band_of_family(loops: Iterable[ContinuousLoop]) -> tuple[float, bool]:
 
 
 def is_quiet(loop: ContinuousLoop, band: float) -> bool:
-    """Whether small gain decides every pole beyond a band.
+    """Return whether small gain decides every pole beyond a band.
 
     Not determined for a rig with an elastic segment: its resonances become ever narrower, and pass between any points
     at which L is evaluated.
@@ -379,7 +379,7 @@ def is_quiet(loop: ContinuousLoop, band: float) -> bool:
 
 
 def has_fallen(loop: ContinuousLoop, band: float) -> bool:
-    """Whether 1 + L has no zero with Im s > band right of the axis, by |L| < 1/2 on the edges of that region.
+    """Return whether 1 + L has no zero with Im s > band right of the axis, by |L| < 1/2 on the edges of that region.
 
     L is evaluated on two decades of the axis, where |L| falls, with the natural frequencies between, and on the upper
     edge of the box; farther right |L| is smaller still.
@@ -400,7 +400,7 @@ def has_fallen(loop: ContinuousLoop, band: float) -> bool:
 
 
 def is_known_without(loop: ContinuousLoop, name: str) -> bool:
-    """Whether poles beyond some band are known of this law, and of any nearer to it, once a leading coefficient is 0.
+    """Return whether poles beyond some band are known of this law, and of any nearer, once a leading coefficient is 0.
 
     Else high modes become unstable as it goes to 0, and their poles come to a band from above: the counts on one side
     of 0 do not follow from those on the other.

@@ -321,7 +321,7 @@ def definite(poly: Poly) -> Literal["above", "not below", "zero", ""]:
 
 
 def is_hurwitz(poly: Poly) -> bool:
-    """Whether all roots lie left of the axis, by Routh's table."""
+    """Return whether all roots lie left of the axis, by Routh's table."""
     row = poly.all_coeffs()[0::2]
     other = poly.all_coeffs()[1::2]
     if not row[0]:

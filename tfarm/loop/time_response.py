@@ -74,7 +74,7 @@ class Peak(NamedTuple):
 
 @dataclass(frozen=True)
 class DelayedResponse:
-    """What an excitation does with one delay [s]: h of each signal, (signals, n) at t >= 0.
+    """Response to an excitation with one delay [s]: h of each signal, (signals, n) at t >= 0.
 
     `late` are exponents and amplitudes (signals, m) of the poles, `direct` those of the direct response, `rests`
     inversions of what is left, the first to an early end.  `difference` (signals,) is the bound on the error of `late`
@@ -171,11 +171,8 @@ class TimeResponse:
         cuts = 8
         # of a peak: less is rounding
         seen = 1e-13
-        # of a record: times that are one
-        same_time = 1e-10
         jumps = self.starts[self.starts <= t[-1]]
-        t = np.union1d(t[abs(t[:, None] - jumps).min(axis=1, initial=math.inf) > same_time * t[-1]], jumps)
-        t = t[np.diff(t, append=math.inf) > same_time * t[-1]]
+        t = _with_jumps(t, jumps)
         after = self.at(t)
         before = after.copy()
         at_jump = np.isin(t, jumps)
@@ -208,8 +205,10 @@ class TimeResponse:
             y = np.array([np.hstack([*part.swapaxes(0, 1)]) for part in (whole[:, :-1], whole[:, 1:])])
             ends = np.array([every[:-1].ravel(), every[1:].ravel()])
             errors = np.tile(errors[:, is_open], cuts)
-        t = np.concatenate(times)
-        y = np.hstack(values)
+        return self._peaks_of(np.concatenate(times), np.hstack(values), most)
+
+    def _peaks_of(self, t: Real, y: Real, most: Real) -> dict[str, Peak]:
+        """Return the peak of each signal from its values (signals, n) at times t and a bound on its size between."""
         largest = (1 - 1e-14) * abs(y).max(axis=1, keepdims=True)
         # the first time of a constant
         places = np.where(abs(y) >= largest, t, math.inf).argmin(axis=1)
@@ -228,6 +227,13 @@ class TimeResponse:
         shares = np.r_[np.geomspace(1e-6, 1, 300), np.linspace(0, 1, 700)]
         t = np.unique([start + part.end * shares for part in self.parts for start in self.starts])
         return t[t <= end]
+
+
+def _with_jumps(t: Real, jumps: Real) -> Real:
+    """Return times and those of jumps, ascending, each once: those closer than 1e-10 of the record are one."""
+    same_time = 1e-10
+    t = np.union1d(t[abs(t[:, None] - jumps).min(axis=1, initial=math.inf) > same_time * t[-1]], jumps)
+    return t[np.diff(t, append=math.inf) > same_time * t[-1]]
 
 
 def _of_both(bends: Real) -> Real:
@@ -270,7 +276,7 @@ def time_response(
 class Transforms:
     """H of the signals and the torque, its direct part and the rest, each (signals, n) at s (n,).
 
-    `acts`: of what acts at the actuator and is added.  `refers`: of references and of what the law feeds back of it,
+    `acts`: of inputs at the actuator and free motions.  `refers`: of references and of free motions that are fed back,
     without the factor e^{-s tau} of its delay.
     """
 
@@ -288,7 +294,7 @@ class Transforms:
 
     @cached_property
     def shares(self) -> Real:
-        """Limits of N/drive for s -> inf (signals, 1): what follows the torque at once; where there is none, 0."""
+        """Limits of N/drive for s -> inf (signals, 1): the share that follows the torque at once, or 0."""
         drive, row = self._rig(self.far)
         ratio = np.array([row[name] for name in self.names]) / drive
         follows = abs(ratio[:, -1] - ratio[:, -2]) <= 1e-3 * abs(ratio[:, -1])

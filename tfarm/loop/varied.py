@@ -262,7 +262,7 @@ class Varied:
     # ------------------------------------------------------------ complete in a box
 
     def with_box(self, modes: int) -> Varied:
-        """The same with a box for all values, as high as `modes` modes, no pole on its edge at the first value."""
+        """Return the loops with one box, as high as `modes` modes, no pole on its edge at the first value."""
         loops = [self.at(value) for value in self.few]
         # heights of the box, until no pole is on its edge at the first value
         for factor in (1.0, 1.013, 1.031, 1.057, 0.985, 1.09):

@@ -182,8 +182,10 @@ def _lines(verdict: Stability, ranges: dict[str, Window]) -> tuple[dict[str, Cal
     if not ranges:
         return {}, band
     if verdict.is_known_beyond or loop.is_of_gains:
-        ends = (loop.having(name, end) for name, pair in ranges.items() for end in critical(name, pair))
-        band = max(band, band_of_family(ends)[0])
+        loops: list[ContinuousLoop] = []
+        for name, pair in ranges.items():
+            loops += [loop.having(name, end) for end in critical(name, pair)]
+        band = max(band, band_of_family(loops)[0])
     terms = LawTerms(loop.signals, loop.law, ranges)
     lines = [Along(lambda: loop, name, terms.line(name, *pair)) for name, pair in ranges.items()]
     return dict(zip(ranges, cross_axis(loop.arm, terms, band, lines), strict=True)), band
@@ -252,7 +254,7 @@ def without_losses(loop: ContinuousLoop, name: str, found: Crossings) -> Crossin
 
 
 def is_decided_along(loop: ContinuousLoop, name: str) -> bool:
-    """Whether a theorem without losses decides the stability of the loop for every value of this gain."""
+    """Return whether a theorem without losses decides the stability of the loop for every value of this gain."""
     if not loop.is_moved_at_hub_alone or loop.arm.input_lags:
         return False
     return loop.arm.reads_hub_moment or (name != MOMENT_GAIN and loop.numbers[MOMENT_GAIN] == 0)
@@ -274,7 +276,7 @@ def theorem_windows(loop: ContinuousLoop, name: str, limits: Window, edges: Cros
 
 
 def is_proven_stable(loop: ContinuousLoop) -> bool:
-    """Whether a theorem excludes unstable poles: every mode is damped, and the static stiffness is positive."""
+    """Return whether a theorem excludes unstable poles: every mode is damped, and the static stiffness is positive."""
     parts = cancel_hub_moment(loop)
     if parts is None or not parts[0] < 1 or loop.theorem.energy != Energy.LOSS:
         return False
