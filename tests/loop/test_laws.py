@@ -206,7 +206,9 @@ def test_a_law_stable_on_two_modes_drives_the_third():
     assert (found.unstable[2:] > 0).all()
     assert (found.verdict.is_stable, found.first_mode, found.shown_from) == (False, 3, 3)
     third = tfarm.modes(BARE, 3).natural_frequency[-1]
-    assert abs(found.driven[0].imag - third) < 0.01 * third
+    assert abs(found.destabilised_poles[0].imag - third) < 0.01 * third
+    with pytest.warns(DeprecationWarning, match=r"it is Spill\.destabilised_poles"):
+        assert found.driven[0] == found.destabilised_poles[0]
     assert "models of 1 to 2 modes are stable" in found.in_words
 
 

@@ -4,6 +4,7 @@ A law is designed on a model of a few modes, and may destabilise a mode of the r
 The verdict of the exact loop, which has all modes, is compared with those of ever larger models.
 """
 
+import warnings
 from collections.abc import Iterator
 from typing import Annotated, NamedTuple
 
@@ -37,10 +38,10 @@ class SpillModel(NamedTuple):
 class Spill:
     """The verdict on the exact loop, and models of `modes` (n,) flexible modes: `unstable` (n,) and `rightmost` (n,).
 
-    `rightmost` [1/s] is the rightmost pole of each, apart from those at 0.  `driven` [1/s] are the exact loop's
-    unstable poles with Im >= 0.  `first_mode` is the flexible mode whose frequency is next to the lowest of those, 0
-    where that is real or below half the first.  From `shown_from` modes on every model is unstable too; None where the
-    last is not.
+    `rightmost` [1/s] is the rightmost pole of each, apart from those at 0.  `destabilised_poles` [1/s] are those of the
+    exact loop with Im >= 0.  `first_mode` is the flexible mode whose frequency is next to the lowest of those, 0 where
+    that is real or below half the first.  From `shown_from` modes on every model is unstable too; None where the last
+    is not.
     """
 
     verdict: Annotated[Stability, Quantity(flat=True)]
@@ -49,9 +50,19 @@ class Spill:
     rightmost: Complex
 
     @property
-    def driven(self) -> Annotated[Complex, Quantity("s", "1/s", help="unstable poles of the exact loop")]:
+    def destabilised_poles(
+        self,
+    ) -> Annotated[Complex, Quantity("s", "1/s", key="driven", help="unstable poles of the exact loop")]:
         """The exact loop's unstable poles, ascending in Im s."""
         return _right_of_axis(self.verdict.poles.moving)
+
+    @property
+    def driven(self) -> Complex:
+        """The unstable poles, by their name of version 1.1."""
+        warnings.warn(
+            "Spill.driven has moved: it is Spill.destabilised_poles", DeprecationWarning, stacklevel=2
+        )
+        return self.destabilised_poles
 
     @property
     def first_mode(
@@ -61,9 +72,9 @@ class Spill:
         Quantity("lowest destabilised mode", help="of the exact loop; 0: a pole below the first mode"),
     ]:
         """The lowest destabilised mode; None where the exact loop is stable in its band."""
-        if not self.driven.size:
+        if not self.destabilised_poles.size:
             return None
-        lowest = float(self.driven[0].imag)
+        lowest = float(self.destabilised_poles[0].imag)
         table = modes(self.verdict.loop.arm, up_to=2.0 * max(lowest, 1.0) + self.verdict.band)
         flexible = table.natural_frequency[table.index > 0]
         if lowest < flexible[0] / 2:
@@ -101,11 +112,11 @@ class Spill:
         self,
     ) -> Annotated[str, Quantity("spillover", help="exact loop, compared with the design models")]:
         """The exact loop, and the models that are stable where it is not."""
-        if not self.driven.size:
+        if not self.destabilised_poles.size:
             where = "" if self.verdict.is_known_beyond else " in the frequency range"
             return f"none: the exact loop is {self.verdict.word}{where}"
         which = f"mode {self.first_mode}" if self.first_mode else "a pole below the first mode"
-        words = f"{which} is unstable in the exact loop, at {abs(self.driven[0]):.6g} rad/s"
+        words = f"{which} is unstable in the exact loop, at {abs(self.destabilised_poles[0]):.6g} rad/s"
         if not self.content.size:
             return f"{words}, and every model is unstable"
         count = self.content.size

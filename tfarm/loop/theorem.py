@@ -291,13 +291,13 @@ def exact_polynomial(coefficients: Sequence[float]) -> Poly:
 
 def on_axis(num: Poly, den: Poly) -> tuple[Poly, Poly]:
     """Return real part, and imaginary part over w, of num(i w) conj den(i w): polynomials in v = w^2."""
-    a, b = _split(num)
-    c, d = _split(den)
+    a, b = _even_and_odd(num)
+    c, d = _even_and_odd(den)
     v = exact_polynomial([1.0, 0.0])
     return a * c + v * b * d, b * c - a * d
 
 
-def _split(poly: Poly) -> tuple[Poly, Poly]:
+def _even_and_odd(poly: Poly) -> tuple[Poly, Poly]:
     """Return a and b of p(i w) = a(v) + i w b(v), v = w^2."""
     ascending = poly.all_coeffs()[::-1]
     found = []
