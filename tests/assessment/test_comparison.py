@@ -10,7 +10,8 @@ import tfarm
 from tests.shell import answer, refused, run
 from tfarm.assessment import comparison
 from tfarm.case import Case
-from tfarm.loop.sampled_verdict import Analysis, sampled_verdict
+from tfarm.loop.sampled_analysis import Analysis
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.schema import Difference, Percent, table, to_dict
 
 BARE, LAB = tfarm.load("sasaki2012"), tfarm.load("sasaki2012-lab")

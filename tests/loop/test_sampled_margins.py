@@ -23,7 +23,8 @@ from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.circle_crossings import ends_of_K1, interval_around, sampled_map, stable_windows
 from tfarm.loop.edges import DelayMargin, Figure, delay_margin, required_damping
 from tfarm.loop.sampled import sampled_loop
-from tfarm.loop.sampled_verdict import Analysis, Verdict, sampled_verdict
+from tfarm.loop.sampled_analysis import Analysis
+from tfarm.loop.sampled_verdict import Verdict, sampled_verdict
 from tfarm.schema import text, to_dict
 from tfarm.spectrum.gains import default_gains
 
@@ -140,9 +141,8 @@ def test_the_verdict_settles_with_damping_and_names_its_modes_without(lab, lossl
 
 def test_the_verdict_is_converged_where_only_fewer_modes_agree(lab, monkeypatch):
     monkeypatch.setattr(room, "complete_band", lambda loop: None)
-    for word, agrees in (("converged for", room.RADIUS_AGREES), ("model of", -1.0)):
-        monkeypatch.setattr(room, "RADIUS_AGREES", agrees)
-        words = sampled_verdict(Case(lab, GAINS)).holds_for
+    for word, limit in (("converged for", {}), ("model of", {"tolerance": -1.0})):
+        words = sampled_verdict(Case(lab, GAINS), **limit).holds_for
         assert re.fullmatch(rf"{word} the first \d+ modes, not determined beyond", words)
 
 

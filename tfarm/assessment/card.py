@@ -31,7 +31,8 @@ from tfarm.loop.curve import LoopCurve, LoopVerdict, gain_margin
 from tfarm.loop.loop_margins import LoopMargins
 from tfarm.loop.margins import Margins, margins
 from tfarm.loop.poles import HUB
-from tfarm.loop.sampled_verdict import SAMPLED_LOOP, Analysis, sampled
+from tfarm.loop.sampled_analysis import Analysis, sampled
+from tfarm.loop.sampled_verdict import SAMPLED_LOOP
 from tfarm.records import frozen
 from tfarm.schema import Percent, Quantity, Table, Tabled, across, text
 from tfarm.schema.html import as_html, with_symbols

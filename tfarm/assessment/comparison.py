@@ -19,16 +19,12 @@ from tfarm.loop.circle_crossings import FACTOR, stable_windows
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.margins import Margins
 from tfarm.loop.margins import margins as margins_of
-from tfarm.loop.plane import Plane, cell_middles, gain_map, plane, ranges_of
+from tfarm.loop.plane import Plane, gain_map, plane
+from tfarm.loop.plane_axes import cell_middles, ranges_of
 from tfarm.loop.poles import HUB, closed_loop_poles, poles_by_mode
-from tfarm.loop.sampled_verdict import (
-    SAMPLED_LOOP,
-    Analysis,
-    SampledBrief,
-    brief_of,
-    sampled_brief,
-    sampled_verdict,
-)
+from tfarm.loop.sampled_analysis import Analysis
+from tfarm.loop.sampled_brief import SampledBrief, brief_of, sampled_brief
+from tfarm.loop.sampled_verdict import SAMPLED_LOOP, sampled_verdict
 from tfarm.records import frozen
 from tfarm.response.frequency import Bode, bode, resonant_band
 from tfarm.schema import Difference, Percent, Quantity, compare_records

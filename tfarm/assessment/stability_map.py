@@ -24,16 +24,8 @@ from tfarm.loop.circle_crossings import (
     sampled_map,
     with_both_sides,
 )
-from tfarm.loop.plane import (
-    Axis,
-    BoundaryLines,
-    Plane,
-    boundary_lines,
-    gain_map,
-    moment_axis,
-    rate_axis,
-    rate_columns,
-)
+from tfarm.loop.plane import BoundaryLines, Plane, boundary_lines, gain_map, moment_axis
+from tfarm.loop.plane_axes import Axis, rate_axis, rate_columns
 from tfarm.loop.sampled import Sampled
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.records import frozen

@@ -41,7 +41,8 @@ from tfarm.loop.circle_crossings import GainMap
 from tfarm.loop.continuous import ContinuousLoop, steep_places
 from tfarm.loop.edges import LONGEST_DELAY_SAMPLES
 from tfarm.loop.panels import Sensor, loop_panels, positions, sensed_places
-from tfarm.loop.plane import Axis, Plane, gain_map, moment_axis, rate_axis, rate_columns
+from tfarm.loop.plane import Plane, gain_map, moment_axis
+from tfarm.loop.plane_axes import Axis, rate_axis, rate_columns
 from tfarm.loop.sampled import Sampled
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import band_of_family, stability

@@ -26,7 +26,8 @@ from tfarm.loop.loop_margins import (
     LoopMargins,
     PhaseCrossover,
 )
-from tfarm.loop.plane import cell_middles, plane
+from tfarm.loop.plane import plane
+from tfarm.loop.plane_axes import cell_middles
 from tfarm.loop.stability import Stability, is_quiet, stability
 from tfarm.loop.theorem import Lyapunov, Signs, lyapunov, signs_of_loop
 from tfarm.loop.windows import Windows, reach_words, windows_of

@@ -18,7 +18,8 @@ from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, must_be_known, require
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.edges import most_modes
-from tfarm.loop.sampled_verdict import SampledBrief, sampled_brief, sampled_verdict
+from tfarm.loop.sampled_brief import SampledBrief, sampled_brief
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import frozen
 from tfarm.schema import Quantity
