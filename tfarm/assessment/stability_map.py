@@ -199,6 +199,6 @@ def least_damping(plane: Plane) -> Real:
     model = continuous_model(plane.arm, signals, DESIGNED_MODES, 8, first_frequency(plane.arm))
     grids = np.meshgrid(*plane.axes)
     laws = [
-        Entry(name, grid.reshape(1, -1), np.ones((1, 1))) for name, grid in zip(signals, grids, strict=True)
+        Entry(name, grid.reshape(1, -1)) for name, grid in zip(signals, grids, strict=True)
     ]
     return damping_of(model, model.poles(laws)).reshape(grids[0].shape)
