@@ -97,7 +97,7 @@ class ComparedSide:
 
     @property
     def verdict(self) -> str:
-        """Of the continuous-time loop, or of the sampled one where there is no other."""
+        """Verdict on the continuous-time loop, or on the sampled one where there is no other."""
         return self.loop.verdict.word
 
     @property
@@ -234,7 +234,7 @@ class Comparison:
             help="pole pairs of a mode that the other loop has none of, or of no mode",
         ),
     ]:
-        """The other oscillating poles."""
+        """Oscillating poles of one side alone, or of no mode."""
         first, second = ({row.mode for row in side.named_poles} - {"none"} for side in self.sides)
         paired = first & second
         found = []
@@ -265,7 +265,7 @@ class Comparison:
 
     @property
     def sides(self) -> tuple[ComparedSide, ComparedSide]:
-        """Both."""
+        """Both sides."""
         return self.one, self.other
 
     @property

@@ -36,7 +36,7 @@ class Millimetres(float):
     """A length [m] that a person reads in mm."""
 
     def as_text(self, digits: int) -> str:
-        """The number of mm."""
+        """Return the number of mm."""
         return general(1e3 * self, digits)
 
 

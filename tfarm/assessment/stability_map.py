@@ -198,7 +198,5 @@ def least_damping(plane: Plane) -> Real:
     signals = tuple(OUTPUT_OF[name] for name in PLANE)
     model = continuous_model(plane.arm, signals, DESIGNED_MODES, 8, first_frequency(plane.arm))
     grids = np.meshgrid(*plane.axes)
-    laws = [
-        Entry(name, grid.reshape(1, -1)) for name, grid in zip(signals, grids, strict=True)
-    ]
+    laws = [Entry(name, grid.reshape(1, -1)) for name, grid in zip(signals, grids, strict=True)]
     return damping_of(model, model.poles(laws)).reshape(grids[0].shape)

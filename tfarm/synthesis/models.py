@@ -96,7 +96,7 @@ class DesignModel:
         through = np.where(abs(through) < ALGEBRAIC, np.nan, through)
         return -share * np.concatenate([Dk @ C, Ck], axis=2) / through, through
 
-    def closed(self, law: Matrices, share: float = 1.0) -> Real:
+    def closed_matrices(self, law: Matrices, share: float = 1.0) -> Real:
         """Return closed-loop matrices (laws, n, n), the plant's states first; nan of algebraic loops."""
         A, B, C, D = self.plant
         Ak, Bk, *_ = law
@@ -115,7 +115,7 @@ class DesignModel:
 
     def poles(self, entries: Sequence[Entry], share: float = 1.0) -> Complex:
         """Return closed-loop poles (laws, n), of a matrix that is not finite far outside."""
-        found = self.closed(self.states(entries), share)
+        found = self.closed_matrices(self.states(entries), share)
         growth = 1e6
         found[~np.isfinite(found).all(axis=(1, 2))] = growth * np.eye(found.shape[1])
         return np.linalg.eigvals(found).astype(complex)
@@ -429,7 +429,7 @@ class Slews:
         own = D[model.signals.index("root_moment")]
         C = own * row
         C[..., : len(B)] += model.own_moment
-        return model.closed(law), np.concatenate([B @ push, Bk @ error], axis=1), C, own * push
+        return model.closed_matrices(law), np.concatenate([B @ push, Bk @ error], axis=1), C, own * push
 
     def _mean_square_in_time(self, entries: Sequence[Entry]) -> Real:
         """Return the mean square (laws,) of the moment over the first mode's period after the slew.
