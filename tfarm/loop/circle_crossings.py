@@ -32,7 +32,8 @@ from tfarm.crossing import (
 )
 from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.crossing.turning import loose_columns
-from tfarm.loop.sampled import OfLoop, Sampled, SampledPoles
+from tfarm.loop.sampled import OfLoop, Sampled
+from tfarm.loop.sampled_poles import SampledPoles
 from tfarm.loop.sampled_rig import CircleGrid
 from tfarm.records import frozen
 from tfarm.schema import Quantity

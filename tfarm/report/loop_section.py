@@ -8,7 +8,6 @@ from typing import Annotated, NamedTuple
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, unit_of, warn_of_cancellations
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
-from tfarm.assessment.card import POOR
 from tfarm.assessment.stability_map import DESIGNED_MODES
 from tfarm.digits import plain, significant
 from tfarm.dsp.discretise import rule_in_words
@@ -206,7 +205,7 @@ def recommended_section(report: ArmReport) -> PageSection:
     each = report.in_s[-1]
     card = results(each.card, each.title)
     # the last is the sampled one
-    if card[-1]["grade"] == POOR:
+    if card[-1]["grade"] == "poor":
         title = "Gains of best damping"
     return PageSection(title=title, answer=answer, card=card)
 
