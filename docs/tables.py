@@ -20,7 +20,7 @@ import numpy as np
 import tfarm
 from tfarm.arm.chain import load_chain
 from tfarm.arm.law_tables import load_law
-from tfarm.assessment.card import GAIN_LIMITS, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS
+from tfarm.assessment.card import GRADE_LIMITS
 from tfarm.audit.published import Validation, validate
 from tfarm.case import Case
 from tfarm.digits import general
@@ -55,14 +55,20 @@ def grades() -> list[str]:
     rows = [
         (
             "gain margin, upwards and downwards",
-            GAIN_LIMITS,
+            GRADE_LIMITS["gain"],
             "at least",
             "dB",
             "[2] section 6.4, [5] section 7-7",
         ),
-        ("phase margin", PHASE_LIMITS, "at least", "deg", "[2] section 6.4, [5] section 7-7"),
-        ("delay margin", PERIOD_LIMITS, "at least", "sampling periods", "one more sample of computing time"),
-        ("peak sensitivity Ms", PEAK_LIMITS, "at most", "", "[1] section 10.3, [3] section 2.4"),
+        ("phase margin", GRADE_LIMITS["phase"], "at least", "deg", "[2] section 6.4, [5] section 7-7"),
+        (
+            "delay margin",
+            GRADE_LIMITS["periods"],
+            "at least",
+            "sampling periods",
+            "one more sample of computing time",
+        ),
+        ("peak sensitivity Ms", GRADE_LIMITS["peak"], "at most", "", "[1] section 10.3, [3] section 2.4"),
     ]
     beyond = {"at least": "below", "at most": "above"}
     return markdown_table(

@@ -26,7 +26,7 @@ from tests.shared import docs_module
 from tests.shell import heard
 from tfarm.arm.chain import CHAIN_TABLES, load_chain
 from tfarm.arm.law_tables import load_law
-from tfarm.assessment.card import GAIN_LIMITS, PEAK_LIMITS, PERIOD_LIMITS, PHASE_LIMITS, grade_of
+from tfarm.assessment.card import GRADE_LIMITS, grade_of
 from tfarm.audit import audit
 from tfarm.audit.published import validate
 from tfarm.cli import main
@@ -258,9 +258,8 @@ def test_grades_of_the_documentation_are_those_of_the_card(tables):
     """Each limit of the table has the grade of its column, and a thousandth beyond it the next one."""
     page = (DOCS / "words.md").read_text(encoding="utf-8")
     assert not re.search(r"(phase|gain) margin[^:\n]*\d+ (deg|dB)", page)  # no second limits next to the table
-    limits = {"gain": GAIN_LIMITS, "phase": PHASE_LIMITS, "delay": PERIOD_LIMITS, "peak": PEAK_LIMITS}
     caption = (ROOT / "tfarm/report/templates/index.html").read_text(encoding="utf-8")
-    assert ", ".join("{:g} and {:g}".format(*each) for each in limits.values()) in re.sub(
+    assert ", ".join("{:g} and {:g}".format(*each) for each in GRADE_LIMITS.values()) in re.sub(
         " (dB|deg|sampling periods)", "", caption
     )
     for row in tables.grades()[2:]:
@@ -268,8 +267,8 @@ def test_grades_of_the_documentation_are_those_of_the_card(tables):
         for cell, word, beyond in zip(cells, ("good", "low"), ("low", "poor"), strict=False):
             side, number, *_ = cell.removeprefix("at ").split()
             worse = float(number) * (0.999 if side == "least" else 1.001)
-            own = limits[name.split()[0]]
-            assert (grade_of(float(number), own), grade_of(worse, own)) == (word, beyond), row
+            margin = name.split()[0].replace("delay", "periods")
+            assert (grade_of(float(number), margin), grade_of(worse, margin)) == (word, beyond), row
 
 
 @pytest.mark.usefixtures("audited")

@@ -33,8 +33,8 @@ from tfarm.loop.margins import margins as margins
 from tfarm.loop.nyquist import nyquist as nyquist
 from tfarm.loop.plane import gain_map
 from tfarm.loop.poles import closed_loop_poles as closed_loop_poles
-from tfarm.loop.sampled_verdict import sampled as sampled
-from tfarm.loop.stability import spill as spill
+from tfarm.loop.sampled_analysis import sampled as sampled
+from tfarm.loop.spillover import spill as spill
 from tfarm.reduced import reduce as reduce
 from tfarm.report.live import explore as explore
 from tfarm.response import bode as bode

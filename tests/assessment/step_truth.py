@@ -19,7 +19,7 @@ import tfarm
 from tests.assessment.inversion import durbin, inverse
 from tfarm.arm import to_toml
 from tfarm.arm.writing import law_toml
-from tfarm.assessment.step import PARTS
+from tfarm.assessment.signal_figures import PARTS
 from tfarm.dsp import Chain
 from tfarm.dsp.scenarios import scenario
 

@@ -28,7 +28,7 @@ from tests.survey import Finding
 from tfarm.arm import Motor
 from tfarm.arm.chain import Sampling, Slew
 from tfarm.assessment import step
-from tfarm.assessment.step import PARTS, LoopResponse
+from tfarm.assessment.signal_figures import PARTS, LoopResponse
 from tfarm.dsp import Chain
 
 AGREES, ENOUGH = 1e-6, 1e-4  # of the peak of a signal, there and elsewhere: two inversions differ by no more
@@ -271,7 +271,7 @@ def identities(found, truth):
 def answered(case):
     """The answer of `step`, its sampled loop left out."""
     nothing = LoopResponse(stability="", certainty="", signals={})
-    with mock.patch.object(step._LoopRecord, "_of_sampled", return_value=nothing):
+    with mock.patch.object(step, "sampled_response", return_value=nothing):
         return step.step(case.arm, case.law, case.chain, case.scenario, case.duration)
 
 

@@ -112,20 +112,20 @@ def test_of_a_small_rate_gain_the_card_is_that_of_a_rigid_arm():
 
 
 @pytest.mark.parametrize(
-    ("size", "limits", "grade"),
+    ("size", "margin", "grade"),
     [
-        (6.0, card.GAIN_LIMITS, "good"),
-        (5.99, card.GAIN_LIMITS, "low"),
-        (2.99, card.GAIN_LIMITS, "poor"),
-        (math.inf, card.PHASE_LIMITS, "good"),
-        (2.0, card.PEAK_LIMITS, "good"),
-        (3.0, card.PEAK_LIMITS, "low"),
-        (math.inf, card.PEAK_LIMITS, "poor"),
-        (None, card.PERIOD_LIMITS, "-"),
+        (6.0, "gain", "good"),
+        (5.99, "gain", "low"),
+        (2.99, "gain", "poor"),
+        (math.inf, "phase", "good"),
+        (2.0, "peak", "good"),
+        (3.0, "peak", "low"),
+        (math.inf, "peak", "poor"),
+        (None, "periods", "-"),
     ],
 )
-def test_grades_change_at_their_limits(size, limits, grade):
-    assert card.grade_of(size, limits) == grade
+def test_grades_change_at_their_limits(size, margin, grade):
+    assert card.grade_of(size, margin) == grade
 
 
 def test_delay_margin_disk_and_time_constant_are_those_of_the_records():

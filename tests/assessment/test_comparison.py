@@ -10,7 +10,8 @@ import tfarm
 from tests.shell import answer, refused, run
 from tfarm.assessment import comparison
 from tfarm.case import Case
-from tfarm.loop.sampled_verdict import Analysis, sampled_verdict
+from tfarm.loop.sampled_analysis import Analysis
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.schema import Difference, Percent, table, to_dict
 
 BARE, LAB = tfarm.load("sasaki2012"), tfarm.load("sasaki2012-lab")
@@ -67,7 +68,7 @@ def test_each_side_is_what_it_is_alone():
         assert loop == to_dict(side.loop)
         assert side.sampled.is_stable == sampled_verdict(Case(LAB, law)).is_stable
         alone = tfarm.closed_loop_poles(LAB, law, 6).values
-        assert side.oscillating[:3] == pytest.approx(alone[alone.imag > 0][:3], rel=1e-12)
+        assert side.oscillating_poles[:3] == pytest.approx(alone[alone.imag > 0][:3], rel=1e-12)
     delays = [tfarm.margins(LAB, law).exact_delay for law in (LAW, other)]
     apart = by_quantity(found.margin_differences)["delay margin, exact"]
     assert apart == (*delays, pytest.approx(delays[1] - delays[0], rel=1e-12))
@@ -85,7 +86,7 @@ def test_poles_are_compared_mode_by_mode_and_what_has_no_partner_apart():
         ("first", "mode 13"), ("first", "mode 14"), ("second", "none"), ("second", "none")
     ]  # fmt: skip
     assert min(abs(row.pole) for row in apart[2:]) > 7e5
-    assert [len(side.oscillating) for side in found.sides] == [14, 14]
+    assert [len(side.oscillating_poles) for side in found.sides] == [14, 14]
     paths = tfarm.locus(LAB, LAW, "all", 0.0, 1.0, 60, 8)
     for mode in range(1, 7):
         ends = paths.branches[paths.mode == mode, -1]
@@ -160,8 +161,9 @@ def test_a_law_of_other_signals_is_mapped_over_factor_and_delay():
         (around,) = (each for each in reach[0] if each[0] < 1 < each[1])
         factors = [factor for factor in side.loop.in_band.gain if 0.1 < factor < 3.9]
         assert [end for end in around if 0.1 < end < 3.9] == pytest.approx(factors, rel=1e-6)
-        at, delay = side.reach(np.array([0.0, 1.0]) * side.loop.exact_delay), side.loop.exact_delay
-        ends = [end for window in at[1] for end in window]
+        delay = side.loop.exact_delay
+        _, windows = side.loop.factor_intervals(np.array([0.0, delay]))
+        ends = [end for window in windows for end in window]
         assert min(abs(end - 1.0) for end in ends) < 1e-6
         assert 0 < delay < delays[-1]
     figure = tfarm.plots.comparison.figure(found)

@@ -25,7 +25,9 @@ from tfarm.exact import system
 from tfarm.exact.system import system_of
 from tfarm.exported import controller, fmu, live_loop, result, systems, tuner_code
 from tfarm.loop import sampled_verdict as verdicts
-from tfarm.loop.sampled_verdict import sampled, sampled_brief, sampled_verdict
+from tfarm.loop.sampled_analysis import sampled
+from tfarm.loop.sampled_brief import sampled_brief
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import CONTINUOUS
 from tfarm.report import live
 from tfarm.schema import to_dict

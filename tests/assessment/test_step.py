@@ -11,7 +11,7 @@ import tfarm
 from tests.shell import answer, run
 from tfarm.arm import Attachment
 from tfarm.arm.chain import Sampling
-from tfarm.assessment.step import PARTS, SAMPLED_NAMES, _LoopRecord
+from tfarm.assessment.signal_figures import PARTS, LoopRecord, SignalCurve
 from tfarm.dsp import Chain
 from tfarm.loop.time_response import Peak
 
@@ -19,6 +19,7 @@ LAB, LOSSLESS = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
 SERVO = tfarm.HubFeedback(K1=1.0, K2=0.3, Kp=3.0)
 IN_Z = tfarm.Law({"hub_rate": 0.3}, period=0.01)
+SCENARIOS = ("reference", "slew", "pulse", "deflection")
 
 
 def test_figures_of_a_second_order_system_are_those_of_the_textbook():
@@ -30,10 +31,8 @@ def test_figures_of_a_second_order_system_are_those_of_the_textbook():
         return 2 * (1 - np.exp(-z * w * t) * (np.cos(wd * t) + z * w / wd * np.sin(wd * t)))
 
     t = np.linspace(0.0, 10.0, 200_001)
-    record = _LoopRecord(
-        LAB, ("hub_angle", "tip_displacement", "root_moment"), 0.0, t, {"hub_angle": 2.1 + 0 * t}, 0.02
-    )
-    found = record._figures("hub_angle", t, y(t), 0 * t)
+    record = LoopRecord(LAB, ("hub_angle", "tip_displacement", "root_moment"), 0.0, t, {"hub_angle": 2.1 + 0 * t}, 0.02)
+    found = record.figures("hub_angle", SignalCurve(t, y(t), 0 * t))
     assert found.overshoot == pytest.approx(math.exp(-math.pi * z / math.sqrt(1 - z * z)), rel=1e-6)
     assert found.peak_time == pytest.approx(math.pi / wd, rel=1e-4)
     assert found.steady_state_error == pytest.approx(0.1, rel=1e-4)
@@ -44,7 +43,7 @@ def test_figures_of_a_second_order_system_are_those_of_the_textbook():
     assert found.residual_rms is None
 
 
-@pytest.mark.parametrize("scenario", SAMPLED_NAMES)
+@pytest.mark.parametrize("scenario", SCENARIOS)
 def test_the_sampled_response_becomes_the_continuous_one(scenario):
     """With a period of 0.2 ms instead of 10 ms the figures of both loops differ by a hundredth, T w1."""
     found = tfarm.step(LAB, SERVO, Chain(sampling=Sampling(period=2e-4)), scenario, 1.5)
@@ -62,7 +61,9 @@ def test_the_settling_time_of_the_root_moment_is_that_of_simulate():
     found, run_ = tfarm.step(LAB, LAW, scenario_name="slew", duration=3.0), tfarm.simulate(LAB, LAW, duration=3.0)
     every = round(found.period / found.t[1])
     t, moment = found.t[::every], found.sampled.signals["root_moment"][::every]
-    coarse = _LoopRecord(LAB, found.names, found.busy_until, t, {}, 0.02)._figures("root_moment", t, moment, 0 * t)
+    coarse = LoopRecord(LAB, found.names, found.busy_until, t, {}, 0.02).figures(
+        "root_moment", SignalCurve(t, moment, 0 * t)
+    )
     assert coarse.settling_time == pytest.approx(run_.settling_time, rel=1e-12)
     assert found.sampled.root_moment.settling_time == pytest.approx(run_.settling_time, abs=0.01)
     assert found.sampled.root_moment.residual_rms == pytest.approx(run_.residual_raw, rel=0.05)
@@ -87,8 +88,9 @@ def test_a_figure_is_not_determined_where_its_bound_leaves_a_hundredth_open(shar
     """A decaying cosine with an error of that share: each figure is within 1 %, or it has a reason in words."""
     t = np.linspace(0.0, 10.0, 5001)
     y = 2.0 * np.exp(-t) * np.cos(7 * t)
-    record = _LoopRecord(LAB, ("hub_rate", "velocity@1.0", "root_moment", "torque"), 0.0, t, {}, 0.02)
-    found = record._figures("hub_rate", t, y, share * 2 + 0 * t, Peak(0.0, 2.0, 2 * share, 2.0 + 2 * share))
+    record = LoopRecord(LAB, ("hub_rate", "velocity@1.0", "root_moment", "torque"), 0.0, t, {}, 0.02)
+    peak = Peak(0.0, 2.0, 2 * share, 2.0 + 2 * share)
+    found = record.figures("hub_rate", SignalCurve(t, y, share * 2 + 0 * t, peak))
     if words is None:
         assert found.peak == 2.0
         assert found.note is None or not found.note.startswith("peak")
@@ -127,18 +129,19 @@ def test_the_peak_of_the_torque_of_a_delayed_filter_is_the_laws_own():
 def test_settling_counts_from_the_end_of_the_motion_within_the_band():
     """Of the sampled signals by hand: the last time outside the band of the travel, less the slew; none is negative."""
     found = tfarm.step(LAB, SERVO, scenario_name="slew", duration=3.0, settling_band=0.0005)
-    usual = _LoopRecord(LAB, found.names, found.busy_until, found.t, found.reference, 0.02)
+    usual = LoopRecord(LAB, found.names, found.busy_until, found.t, found.reference, 0.02)
     for name, of, scale in (("hub_angle", found.sampled.hub, 1.15), ("root_moment", found.sampled.root_moment, None)):
         y = found.sampled.signals[name]
         away = abs(y - y[found.t >= 2.7 - 1e-9].mean())
-        for band, figures in ((0.0005, of), (0.02, usual._figures(name, found.t, y, 0 * y))):
+        for band, figures in ((0.0005, of), (0.02, usual.figures(name, SignalCurve(found.t, y, 0 * y)))):
             last = found.t[np.flatnonzero(away > band * (scale or away.max()))[-1] + 1]
             is_settled = last < 2.7
             assert (figures.settling_time is not None) == is_settled
             if is_settled:
                 assert figures.settling_time == pytest.approx(max(0.0, last - 1.0), abs=2e-3)
                 assert figures.at_rest_after == pytest.approx(max(1.0, last), abs=2e-3)
-    assert usual._figures("hub_angle", found.t, found.sampled.signals["hub_angle"], 0 * found.t).settling_time == 0.0
+    angle = SignalCurve(found.t, found.sampled.signals["hub_angle"], 0 * found.t)
+    assert usual.figures("hub_angle", angle).settling_time == 0.0
     with pytest.raises(tfarm.ParameterError, match=r"settling_band = 2: a share of the travel between 0 and 1"):
         tfarm.step(LAB, SERVO, settling_band=2)
 
@@ -217,7 +220,7 @@ def test_what_has_no_response_is_refused_in_a_line(what):
         tfarm.step(arm, law, scenario_name=scenario)
 
 
-@pytest.mark.parametrize("scenario", ["reference", "slew", "pulse", "deflection"])
+@pytest.mark.parametrize("scenario", SCENARIOS)
 def test_a_record_has_whole_samples_and_one_shorter_than_a_period_is_refused(scenario):
     """Others are of whole samples, of 10 ms; a released mode and a massless hub have a response too."""
     with pytest.raises(tfarm.ParameterError, match=r"duration = 0\.004: at least one sampling period, 0\.01 s"):

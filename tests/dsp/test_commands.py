@@ -19,7 +19,7 @@ from tfarm.case import Case
 from tfarm.cli.app import load_chain
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
-from tfarm.loop.sampled_verdict import brief_of
+from tfarm.loop.sampled_brief import brief_of
 from tfarm.plots import slew
 from tfarm.report.sampled_section import response_columns
 from tfarm.synthesis import design

@@ -12,8 +12,7 @@ from tests.shared import circle_crossings
 from tfarm.arm import FED_BACK, HubFeedback, Law
 from tfarm.case import Case
 from tfarm.dsp import Chain, Converters, Sampling
-from tfarm.loop import circle as circle_module
-from tfarm.loop.circle import Arcs, Circle, Discs, complete_band, root_ratio
+from tfarm.loop.circle import Arcs, Circle, Discs, complete_band, filter_bound, root_ratio
 from tfarm.loop.circle_crossings import FACTOR
 from tfarm.loop.edges import delay_limit, whole_loop
 from tfarm.loop.sampled import sampled_loop
@@ -36,10 +35,10 @@ def test_the_filters_own_pole_errs_by_what_the_model_is_off_at_its_corner(delay)
     z = np.exp(1j * np.linspace(0, np.pi, 2001))
     late = math.exp(-corner * T * (1 - delay % 1))
     most = max(abs((1 - 1 / z) * late / (z - math.exp(-corner * T))))
-    found = circle_module._of_the_filter(loop, 1000.0)
+    found = filter_bound(loop, 1000.0)
     np.testing.assert_allclose(found, [0.0, *abs(model - exact)[1:] * most], rtol=1e-6, atol=1e-15)
     assert found[2] > 1e-12
-    assert not circle_module._of_the_filter(loop, 150.0).any()  # its pole is left of the line
+    assert not filter_bound(loop, 150.0).any()  # its pole is left of the line
 
 
 def test_without_a_band_a_delay_margin_has_the_digits_that_twice_the_modes_leave():
@@ -106,7 +105,7 @@ def test_a_disc_about_a_point_is_as_wide_as_rounding_next_to_a_pole_too():
     plant = loop.plant
     q = np.angle(loop.pulse.multipliers[0]) + np.array([1e-9, 1e-5, 0.3])
     circle = Circle(loop, np.ones(plant.poles.size, bool), np.zeros(3))
-    found = circle.summed(Arcs(q, 0 * q), plant.residues)
+    found = circle.pole_sums(Arcs(q, 0 * q), plant.residues)
     with mpmath.workdps(40):
         z = [mpmath.expj(mpmath.mpf(each)) for each in q]
         b = [mpmath.exp(mpmath.mpc(each) * T) for each in plant.poles]
@@ -134,9 +133,9 @@ def test_discs_hold_the_terms_of_the_loop(arm, chain):
     """x^n H, through the law, at the middle and at a point of arcs, by `SampledRig.terms`; before and after a cut."""
     loop = whole_loop(Case(arm, HELD, chain))
     circle, rng = complete_band(loop).circle, np.random.default_rng(3)
-    for share in (0.5, rng.uniform(0, 1, circle_module.ARCS)):
-        arcs = np.flatnonzero(circle.low > 0.1)[: circle_module.ARCS]
-        q = circle.low[arcs] + (share * np.ones(circle_module.ARCS))[: arcs.size] * (circle.high - circle.low)[arcs]
+    for share in (0.5, rng.uniform(0, 1, circle.first_arcs)):
+        arcs = np.flatnonzero(circle.low > 0.1)[: circle.first_arcs]
+        q = circle.low[arcs] + (share * np.ones(circle.first_arcs))[: arcs.size] * (circle.high - circle.low)[arcs]
         z = np.exp(1j * q)
         terms = loop.rig.terms(z, None, np.ones(q.size))
         for row, (_, signal, gain, roots) in enumerate(circle.terms):
@@ -145,7 +144,7 @@ def test_discs_hold_the_terms_of_the_loop(arm, chain):
             is_middle = np.isscalar(share) and arm in (LAB, BRAKED)  # of the others the terms themselves lose digits
             assert (off <= (1e-8 * abs(disc.middle[arcs]) if is_middle else disc.radius[arcs])).all()
         circle.count(loop.having("K2", 1.1).weights)
-    assert circle.low.size > circle_module.ARCS
+    assert circle.low.size > circle.first_arcs
 
 
 @pytest.mark.parametrize("chain", CHAINS.values(), ids=CHAINS)

@@ -16,7 +16,8 @@ from tfarm.case import Case
 from tfarm.dsp import Chain, Converters, Sampling, load_chain
 from tfarm.dsp.discretise import acting_law, law_in_z, with_estimate
 from tfarm.loop.sampled import sampled_loop
-from tfarm.loop.sampled_verdict import Analysis, sampled_verdict
+from tfarm.loop.sampled_analysis import Analysis
+from tfarm.loop.sampled_verdict import sampled_verdict
 
 LAB, FILES = tfarm.load("sasaki2012-lab"), Path(__file__).parents[1] / "data" / "reproductions"
 T = 0.01

@@ -20,10 +20,11 @@ from tfarm import ConvergenceError, HubFeedback, Law, ParameterError
 from tfarm.case import Case
 from tfarm.loop.lines import through_infinity, with_numbers
 from tfarm.loop.nyquist import nyquist_of
-from tfarm.loop.plane import cell_middles, plane
+from tfarm.loop.plane import plane
+from tfarm.loop.plane_axes import cell_middles
 from tfarm.loop.poles import poles_below
 from tfarm.loop.sampled_verdict import sampled_verdict
-from tfarm.loop.stability import Spill
+from tfarm.loop.spillover import Spill
 from tfarm.loop.theorem import cancel_hub_moment, definite, exact_polynomial, is_hurwitz, on_axis, signs_of
 from tfarm.reduced.modal import closed_loop_matrix, sensed_model
 from tfarm.response.signals import Signals
@@ -205,7 +206,9 @@ def test_a_law_stable_on_two_modes_drives_the_third():
     assert (found.unstable[2:] > 0).all()
     assert (found.verdict.is_stable, found.first_mode, found.shown_from) == (False, 3, 3)
     third = tfarm.modes(BARE, 3).natural_frequency[-1]
-    assert abs(found.driven[0].imag - third) < 0.01 * third
+    assert abs(found.destabilised_poles[0].imag - third) < 0.01 * third
+    with pytest.warns(DeprecationWarning, match=r"it is Spill\.destabilised_poles"):
+        assert found.driven[0] == found.destabilised_poles[0]
     assert "models of 1 to 2 modes are stable" in found.in_words
 
 

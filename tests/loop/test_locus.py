@@ -19,9 +19,10 @@ from tests.shell import run
 from tfarm import Arm, Hub, HubFeedback, Law, Link, Payload, Section
 from tfarm.arm import Attachment, Motor
 from tfarm.case import Case
+from tfarm.loop.branches import Origin, origin_name
 from tfarm.loop.lines import line_crossings
-from tfarm.loop.loci import damping_ratios, held_branches, loci, most_damped, reduced_locus
-from tfarm.loop.locus import CONTROLLER, RIGID, frame, locus, origin_name
+from tfarm.loop.loci import damping_ratios, loci, most_damped, reduced_locus, round_branches
+from tfarm.loop.locus import frame, locus
 from tfarm.loop.poles import poles_below
 from tfarm.schema import curve_table
 from tfarm.spectrum.damped import damped_modes
@@ -138,7 +139,8 @@ def test_a_table_is_titled_by_what_varies_and_each_branch_has_its_origin(capsys)
     found = locus(RIGS["back-EMF"], law, "hub_angle", 0.0, 1.0, 5, 2)
     integral = Law({"hub_angle": ([1.0, 5.0], [1.0, 0.0]), "hub_rate": 0.4})
     rests = locus(LAB, integral, "gain", 0.0, 1.0, 5, 2)
-    assert rests.origin[rests.branches[:, 0] == 0].tolist() == [RIGID, RIGID, CONTROLLER]
+    at_rest = rests.origin[rests.branches[:, 0] == 0].tolist()
+    assert at_rest == [Origin.RIGID_BODY, Origin.RIGID_BODY, Origin.CONTROLLER]
     assert (found.varied.title, found.titles["gain"]) == (("factor on hub_angle", ""), ("factor on hub_angle", ""))
     names = dict(zip(found.branches[:, 0].tolist(), map(origin_name, found.origin.tolist()), strict=True))
     assert names[min(names, key=lambda s: abs(s + 250.0))] == "controller"  # 1/T, uncoupled at a factor of 0
@@ -380,8 +382,8 @@ def test_the_frame_of_a_picture_touches_its_outermost_points_and_holds_the_axis(
 def test_ten_digits_of_its_size_are_shown_and_a_gain_has_its_unit():
     """A small real part at a large frequency has the digits that |s| leaves it."""
     pole = np.array([-0.123456789012345 + 98.7654321098765j, 0.0])
-    assert held_branches(pole) == pytest.approx([-0.12345679 + 98.76543211j, 0.0], rel=1e-15)
-    assert abs(held_branches(1e5 * pole) - 1e5 * held_branches(pole)).max() <= 1e-15 * 1e7
+    assert round_branches(pole) == pytest.approx([-0.12345679 + 98.76543211j, 0.0], rel=1e-15)
+    assert abs(round_branches(1e5 * pole) - 1e5 * round_branches(pole)).max() <= 1e-15 * 1e7
     held = replace(LAB, hub=replace(LAB.hub, stiffness=2.0))
     assert [loci(Case(arm, HUB), vary, 0.0, 0.5).unit for arm, vary in ((LAB, "K1"), (held, "K2"))] == ["N m s/rad", ""]
 

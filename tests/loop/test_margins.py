@@ -343,7 +343,7 @@ def test_models_that_nothing_damps_are_not_unstable_by_rounding():
     found = tfarm.spill(arm, Law({"hub_angle": 1.0, "root_moment": 0.3}), 4)
     assert found.rightmost.real.max() > 0
     assert found.unstable.tolist() == [0] * 4
-    assert found.driven.size == 0
+    assert found.destabilised_poles.size == 0
 
 
 def test_margins_look_at_what_is_narrow_in_the_law_itself():

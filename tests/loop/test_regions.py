@@ -13,7 +13,8 @@ from tests.loop.ritz_loop import RitzLoop
 from tests.loop.test_lossless import RIGS
 from tests.shared import refusal, thinned
 from tfarm import HubFeedback
-from tfarm.loop.plane import INFINITE, LINEAR_SCALE, Axis, cell_middles, edge, gain_map, ranges_of, static_edges
+from tfarm.loop.plane import INFINITE, edge, gain_map, static_edges
+from tfarm.loop.plane_axes import Axis, cell_middles, ranges_of
 from tfarm.loop.poles import poles_below
 from tfarm.schema import to_dict
 from tfarm.spectrum.gains import default_gains
@@ -136,7 +137,7 @@ EPS = np.finfo(float).eps
 @pytest.mark.parametrize("axis", [Axis(-0.1, 500.0, 0.1), Axis(-50.0, 2.0, 2.0), Axis(-30.0, 7.0, 10.0)])
 def test_an_axis_is_matplotlibs_own(axis):
     """So that a share of the picture is one: symlog, base 10."""
-    theirs = SymmetricalLogTransform(10.0, axis.linear, LINEAR_SCALE)
+    theirs = SymmetricalLogTransform(10.0, axis.linear, axis.linear_scale)
     x = np.linspace(axis.low, axis.high, 101)
     low, high = theirs.transform(np.array([axis.low, axis.high]))
     assert axis.place(x) == pytest.approx((theirs.transform(x) - low) / (high - low), abs=8 * EPS)

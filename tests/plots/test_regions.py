@@ -11,7 +11,8 @@ from tfarm.assessment.stability_map import sampled_region
 from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.exported.live_loop import live_data
-from tfarm.loop.plane import moment_axis, rate_axis, rate_columns
+from tfarm.loop.plane import moment_axis
+from tfarm.loop.plane_axes import rate_axis, rate_columns
 from tfarm.loop.stability import stability
 from tfarm.report.blocks import prose
 

@@ -10,7 +10,8 @@ from tfarm.crossing import pieces
 from tfarm.dsp import load_chain
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.locus import locus, refine_branches
-from tfarm.loop.plane import moment_axis, rate_axis
+from tfarm.loop.plane import moment_axis
+from tfarm.loop.plane_axes import rate_axis
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_modes import sampled_loci
 from tfarm.plots import locus as locus_plot

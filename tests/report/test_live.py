@@ -22,7 +22,7 @@ from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, load_chain
 from tfarm.exported.live_loop import live_data, sensor_numbers, slew_numbers
 from tfarm.loop.continuous import ContinuousLoop
-from tfarm.loop.panels import MOST_MISS, loop_panels
+from tfarm.loop.panels import loop_panels
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.report import page as report_page
 from tfarm.report.live import has_sliders, save_live
@@ -80,8 +80,8 @@ def test_the_error_that_the_page_states_is_not_exceeded(case):
         held = page.at(omega)
         factor = (held * exact.conj()).sum() / (abs(exact) ** 2).sum()
         missed = abs(held - factor * exact).max(axis=1) / abs(held).max(axis=1)
-        assert missed.max() < 100 * MOST_MISS
-    assert data["error"] <= MOST_MISS
+        assert missed.max() < 1e-9
+    assert data["error"] <= 1e-11
 
 
 def test_sampled_poles_of_the_plant_in_the_page_are_the_librarys(case):

@@ -16,7 +16,6 @@ from tfarm.assessment import stability_map
 from tfarm.assessment.card import margins_of
 from tfarm.case import Case
 from tfarm.dsp import Chain, load_chain
-from tfarm.loop import plane as edges
 from tfarm.loop.continuous import frequency_above_mode
 from tfarm.loop.loci import loci
 from tfarm.loop.nyquist import nyquist
@@ -61,7 +60,7 @@ def coarse():
 def test_the_edge_is_smooth_and_inside_the_picture(lab):
     """Neighbours lie close as seen, so that what is drawn between them is the curve itself."""
     places = np.stack([lab.x.place(lab.boundary.points[:, 0]), lab.y.place(lab.boundary.points[:, 1])])
-    assert np.nanmax(np.hypot(*np.diff(places))) < edges.LONG_SEGMENT
+    assert np.nanmax(np.hypot(*np.diff(places))) < 0.03  # of the picture
     assert np.isnan(lab.boundary.points[-1]).all()
 
 
@@ -76,7 +75,7 @@ def test_no_part_of_the_edge_is_missing(lab):
                 continue  # the line K1 = 0 is drawn on its own
             half = (0.5 / stability_map.GRID_COLUMNS) * axis, (0.5 / stability_map.GRID_ROWS) * (1 - axis)
             middle = across[column] + half[0], up[row] + half[1]
-            assert np.hypot(*(edge - middle).T).min() < edges.SHORT_SEGMENT
+            assert np.hypot(*(edge - middle).T).min() < 0.008
 
 
 def test_contours_reach_the_frame_and_words_overlap_nothing(lab, section):

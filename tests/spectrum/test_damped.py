@@ -25,7 +25,7 @@ from tfarm.cli.running import run
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
 from tfarm.exact.system import system_of
-from tfarm.loop.locus import open_poles
+from tfarm.loop.branches import open_poles
 from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import damped_tables, locked_table
 from tfarm.spectrum.damped import NOT_ASSIGNED, DampedModes, damped_modes, damped_starts, origins_of

@@ -17,12 +17,12 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop.continuous import frequency_above_mode
 from tfarm.loop.stability import stability
 from tfarm.synthesis.design import design
-from tfarm.synthesis.models import PERIOD_POINTS
 
 LAB, BARE = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 BOUNDS = {"K1": (0.0, 20.0), "K2": (-2.0, 1.0)}
 MODEL, TOP = RitzLoop(LAB, 12), frequency_above_mode(LAB, 2)
 RISE, TURN = 1.0, 1.15  # s, rad: the default slew of a chain
+POINTS = 64  # of the period after it
 
 
 def slew(model, law):
@@ -42,9 +42,9 @@ def slew(model, law):
         z = half @ z
     assert z[N] == pytest.approx(TURN)
     z[-1] = 0.0
-    step = expm(whole * 2 * np.pi / tfarm.modes(arm, 1).natural_frequency[-1] / PERIOD_POINTS)
+    step = expm(whole * 2 * np.pi / tfarm.modes(arm, 1).natural_frequency[-1] / POINTS)
     moment = []
-    for _ in range(PERIOD_POINTS):
+    for _ in range(POINTS):
         moment.append(z[N - 1])
         z = step @ z
     return np.array(moment)

@@ -135,7 +135,7 @@ def test_a_design_is_at_least_as_good_as_a_known_stable_law(name, structure, obj
     form = structure_of(structure, arm, Kp=0.0, modes=2, period=Chain().sampling.period, bounds={})
     law = form.record_at(form.at(at))
     judge = judge_of(arm, law, objective)
-    assert judge.holds(law)
+    assert judge.is_stable(law)
     assert abs(judge.score(law)) == pytest.approx(value, rel=1e-5)
     found = tfarm.design(arm, objective, structure=structure)
     assert judge.score(found.law) <= judge.score(law) + AS_GOOD * value

@@ -27,7 +27,7 @@ from tfarm.synthesis import judge, search
 from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import LOST, RESERVE
 from tfarm.synthesis.models import in_blocks, squares
-from tfarm.synthesis.structures import INTEGRAL_SPEED, STRUCTURES, structure_of
+from tfarm.synthesis.structures import STRUCTURES, structure_of
 from tfarm.tuner.trial import Cost, slew_trial
 from tfarm.tuner.tuning import usual_plan
 
@@ -342,7 +342,7 @@ def test_a_sampled_pid_is_stable_with_a_reserve_by_another_model_and_as_good_as_
     assert all(sampled_verdict(Case(LAB, law.times(share), pid[False].chain)).is_stable for share in (0.8, 1.0, 1.25))
     assert np.log(HELD.radius(law)) == pytest.approx(np.log(pid[False].sampled.spectral_radius), rel=1e-4)
     assert pid[False].at_limit == ("Ki",)
-    assert c["Ki"] == pytest.approx(INTEGRAL_SPEED * c["Kp"] * np.sqrt(c["Kp"] / LAB.total_inertia), rel=1e-9)
+    assert c["Ki"] == pytest.approx(0.1 * c["Kp"] * np.sqrt(c["Kp"] / LAB.total_inertia), rel=1e-9)
     assert pid[True].value >= design(LAB, structure="PD", continuous=True).value
     assert pid[False].value >= 0.97 * design(LAB, structure="lead").value  # PD with a filter, of the angle too
 

@@ -18,7 +18,8 @@ from tfarm.schema import Percent, Quantity
 from tfarm.spectrum import modes
 from tfarm.spectrum.listing import listed_modes
 
-DEFAULTS = {  # of the tables that a file may leave out
+# of the tables that a file may leave out
+DEFAULTS = {
     "clamp": "rigid, no spring between hub and link",
     "joint": "rigid, no spring between drive and hub",
     "motor": "none, the input is the torque on the hub, or its angle where it is locked",
@@ -112,7 +113,9 @@ def check_arm(name: str, theory: Theory | None = None) -> ArmCheck:
     Raises ParameterError, naming the file and the key, for the first problem.
     """
     file = load_tables(name)
-    arm = load(file) if theory is None else load(file).under(theory)
+    arm = load(file)
+    if theory is not None:
+        arm = arm.under(theory)
     law = load_law(file)
     chain = load_chain(file)
     first = listed_modes(modes(arm, 1)).modes[-1]
@@ -163,7 +166,8 @@ def _warnings(
             f"damping = {reference_damping(arm):.3g} in [link] is a damping ratio of 0.1 % in mode 1"
         )
     # samples cannot show the mode
-    if chain.sampling.period > (longest := math.pi / omega):
+    longest = math.pi / omega
+    if chain.sampling.period > longest:
         yield (
             f"sampling.period = {chain.sampling.period:g}: above half the period of the first mode, {longest:.3g} s, "
             "which is aliased; choose a tenth of that"
@@ -183,6 +187,6 @@ def with_damping(tables: dict[str, Any], ratio: float | None) -> dict[str, Any]:
         0 < ratio < 1, "--damping-ratio", ratio, "above 0 and below 1; 0.005 is 0.5 % of critical damping"
     )
     # of bending alone
-    C = 2 * ratio / float(modes(arm, 1).natural_frequency[-1])
+    C = reference_damping(arm, ratio)
     found = listed_modes(modes(arm.having(damping=C), 1)).modes[-1].damping_ratio or ratio
     return tables | {"link": {"damping": float(f"{C * ratio / found:.4g}")} | tables["link"]}

@@ -19,7 +19,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import lru_cache
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 from tfarm.arm import AnyLaw, Arm
 from tfarm.case import Case
@@ -31,30 +31,25 @@ from tfarm.loop.curve import LoopCurve, LoopVerdict, gain_margin
 from tfarm.loop.loop_margins import LoopMargins
 from tfarm.loop.margins import Margins, margins
 from tfarm.loop.poles import HUB
-from tfarm.loop.sampled_verdict import SAMPLED_LOOP, Analysis, sampled
+from tfarm.loop.sampled_analysis import Analysis, sampled
+from tfarm.loop.sampled_verdict import SAMPLED_LOOP
 from tfarm.records import frozen
 from tfarm.schema import Percent, Quantity, Table, Tabled, across, text
 from tfarm.schema.html import as_html, with_symbols
 from tfarm.spectrum import modes
 from tfarm.spectrum.gains import default_gains
 
-# the first of a margin which is not defined
-GRADES = UNDEFINED, GOOD, LOW, POOR = "-", "good", "low", "poor"
-GRADED = {  # names of the graded margins in the grade of the loop
+_AnyLoop = TypeVar("_AnyLoop")
+# names of the graded margins in the grade of the loop
+GRADED = {
     "gain_margin": "gain margin",
     "gain_reduction": "gain margin downwards",
     "phase_margin": "phase margin",
     "delay_margin": "delay margin",
     "peak_sensitivity": "Ms",
 }
-GAIN_LIMITS = (6.0, 3.0)
-PHASE_LIMITS = (45.0, 30.0)
-PERIOD_LIMITS = (1.0, 0.5)
-PEAK_LIMITS = (2.0, 3.0)
-UNDAMPED = (
-    "undamped model: margins and grades are those with C = {:.4g} s, 0.1 % of critical damping in mode 1; "
-    "at C = 0 the exact delay and disk margins are 0 for every gain"
-)
+# of good and of low: gain margins [dB], phase margin [deg], delay margin in sampling periods, Ms
+GRADE_LIMITS = {"gain": (6.0, 3.0), "phase": (45.0, 30.0), "periods": (1.0, 0.5), "peak": (2.0, 3.0)}
 
 
 class Graded(NamedTuple):
@@ -67,13 +62,12 @@ class Graded(NamedTuple):
     grade: Annotated[str, Quantity(help="good, low, poor, or - where not defined")]
 
     def as_text(self, digits: int) -> str:
-        """Value, frequency and grade."""
+        """Return value, frequency and grade."""
         if self.value is None:
-            return UNDEFINED
+            return "-"
         size = "no limit" if math.isinf(self.value) else text(self.value, digits)
-        return (
-            f"{size}{'' if self.omega is None else f' at {general(self.omega, digits)} rad/s'}, {self.grade}"
-        )
+        place = "" if self.omega is None else f" at {general(self.omega, digits)} rad/s"
+        return f"{size}{place}, {self.grade}"
 
 
 class LeastDamped(NamedTuple):
@@ -83,19 +77,21 @@ class LeastDamped(NamedTuple):
     mode: Annotated[str, Quantity(help="flexible mode whose pole is nearest; else the hub or the controller")]
 
     def as_text(self, digits: int) -> str:
-        """Ratio and mode."""
+        """Return ratio and mode."""
         return f"{self.ratio.as_text(digits)}, {self.mode}"
 
 
-NOT_DEFINED = Graded(None, None, UNDEFINED)
 # card and curve of a page
 margins_of = lru_cache(maxsize=64)(margins)
 sampled_of = lru_cache(maxsize=16)(sampled)
 
 
-def loop_names(period: float) -> tuple[str, str]:
-    """The continuous-time loop and the one sampled every `period` [s], as tables name them."""
-    return "continuous-time", f"sampled, {1e3 * period:g} ms"
+def loops_by_name(
+    period: float, continuous: _AnyLoop | None, sampled: _AnyLoop | None
+) -> dict[str, _AnyLoop]:
+    """Return the continuous-time loop and the one sampled every `period` [s], without None, as tables name them."""
+    both = {"continuous-time": continuous, f"sampled, {1e3 * period:g} ms": sampled}
+    return {name: loop for name, loop in both.items() if loop is not None}
 
 
 @frozen(kw_only=True)
@@ -201,7 +197,7 @@ class LoopCard:
     @property
     def finding(self) -> str:
         """Stability, and of a stable loop the grade with the margins that have it."""
-        if self.grade in (UNDEFINED, GOOD):
+        if self.grade in ("-", "good"):
             return self.stability
         return f"{self.stability}, {self.grade}: {', '.join(self.limited_by)}"
 
@@ -220,8 +216,7 @@ class ResultCard(Tabled):
     @property
     def loops(self) -> dict[str, LoopCard]:
         """The loops that are determined, by name."""
-        both = zip(loop_names(self.period), (self.continuous, self.sampled), strict=True)
-        return {name: each for name, each in both if each is not None}
+        return loops_by_name(self.period, self.continuous, self.sampled)
 
     @property
     def finding(self) -> str:
@@ -250,15 +245,19 @@ def result_card(
     `continuous` (of `margins`) and `at_samples` (of `sampled`) are what is known of these loops already.  Raises
     ParameterError where there is no loop.
     """
-    scaled = "default gains: scaled from the paper's, not a design; "
-    recommended = "`tfarm design` recommends gains", "without damping of the link no design is robust"
     case = admit_case(SAMPLED_LOOP, Case(arm, law, chain))
     _, undamped = graded_arm(case.arm)
-    notes = [scaled + recommended[case.arm.has_elastic_link]] if case.gains == default_gains(case.arm) else []
-    notes += [undamped] if undamped else []
+    notes = [undamped] if undamped else []
+    if case.gains == default_gains(case.arm):
+        advice = "`tfarm design` recommends gains"
+        if undamped:
+            advice = "without damping of the link no design is robust"
+        notes.insert(0, f"default gains: scaled from the paper's, not a design; {advice}")
     known = {"continuous": continuous, "sampled": at_samples}
     cards: dict[str, LoopCard | None] = dict.fromkeys(known)
-    for name in known if not case.law.is_discrete else ("sampled",):
+    if case.law.is_discrete:
+        del known["continuous"]
+    for name in known:
         try:
             cards[name] = loop_card(name, case, known[name])
         except ConvergenceError as error:
@@ -286,19 +285,24 @@ def loop_card(name: str, case: Case, known: Margins | Analysis | None = None) ->
     return card_of(found, case.chain, found if is_graded else analysis_of(name, case.on(damped)))
 
 
-def reference_damping(arm: Arm) -> float:
-    """Kelvin-Voigt damping C [s] with which the first mode of an undamped arm has the damping ratio 0.1 %."""
-    # damping ratio of mode 1 with which an undamped arm is graded; less is small damping
-    reference_ratio = 1e-3
-    return 2 * reference_ratio / float(modes(arm, 1).natural_frequency[-1])
+def reference_damping(arm: Arm, ratio: float = 1e-3) -> float:
+    """Return the Kelvin-Voigt damping C [s] with which mode 1 of an undamped arm has a damping ratio.
+
+    With 0.1 % an undamped arm is graded; less is small damping.
+    """
+    return 2 * ratio / float(modes(arm, 1).natural_frequency[-1])
 
 
 def graded_arm(arm: Arm) -> tuple[Arm, str]:
-    """The arm whose margins are graded, with the damping of reference where its link has none, and the note of that."""
+    """Return the arm that is graded, with damping of reference where its link has none, and the note of that."""
     if not arm.has_elastic_link:
         return arm, ""
     reference = reference_damping(arm)
-    return arm.having(damping=reference), UNDAMPED.format(reference)
+    note = (
+        f"undamped model: margins and grades are those with C = {reference:.4g} s, 0.1 % of critical damping "
+        "in mode 1; at C = 0 the exact delay and disk margins are 0 for every gain"
+    )
+    return arm.having(damping=reference), note
 
 
 def card_of(found: Margins | Analysis, chain: Chain, graded: Margins | Analysis | None = None) -> LoopCard:
@@ -323,7 +327,7 @@ def words_of(verdict: LoopVerdict, chain: Chain) -> dict[str, Any]:
     """Return stability and certainty of a verdict on the loop of a chain."""
     return {
         "stability": verdict.word,
-        "certainty": f"{verdict.range_words}{not_covered(verdict.consumer, chain)}",
+        "certainty": verdict.range_words + not_covered(verdict.consumer, chain),
     }
 
 
@@ -357,9 +361,8 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
     def as_card(name: str) -> LoopCurve:
         word = analysis_of(name, case).verdict.word
         curve = analysis_of(name, case.on(damped)).curve
-        return replace(
-            curve, stability=word, note=note, margins=None if word == "unstable" else curve.margins
-        )
+        found = None if word == "unstable" else curve.margins
+        return replace(curve, stability=word, note=note, margins=found)
 
     found = None if case.law.is_discrete else as_card("continuous")
     if found is not None and chain is None:
@@ -368,7 +371,7 @@ def loop_function(arm: Arm, law: AnyLaw, chain: Chain | None = None) -> LoopCurv
 
 
 def _least_damped(poles: Iterable[tuple[int, complex]]) -> LeastDamped | None:
-    """The pole of least damping ratio among some with their modes."""
+    """Return the pole of least damping ratio among some with their modes."""
     ratios = [(Percent(-s.real / abs(s) + 0.0), n) for n, s in poles]
     if not ratios:
         return None
@@ -379,37 +382,43 @@ def _least_damped(poles: Iterable[tuple[int, complex]]) -> LeastDamped | None:
 def _margins(band: LoopMargins | None, delay: float | None, period: float) -> dict[str, Any]:
     """Return the graded margins from those of a stable loop function and its delay margin [s]."""
     if band is None:
-        undefined = {"grade": UNDEFINED, "limited_by": (), "delay_margin_periods": None, "disk_margin": None}
-        return dict.fromkeys(GRADED, NOT_DEFINED) | undefined
+        undefined = {"grade": "-", "limited_by": (), "delay_margin_periods": None, "disk_margin": None}
+        return dict.fromkeys(GRADED, Graded(None, None, "-")) | undefined
+    periods = None
+    milliseconds = None
+    if delay is not None:
+        # also of a lower bound
+        number = type(delay)
+        periods = number(delay / period)
+        milliseconds = number(1e3 * delay)
     down, up = (gain_margin(band, factor) for factor in band.gain)
-    phase = band.phase_margin
+    phase = abs(band.phase_margin.value)
     peak = band.sensitivity_peak
-    periods = None if delay is None else type(delay)(delay / period)
-    graded = (
-        Graded(*up, grade_of(up[0], GAIN_LIMITS)),
-        Graded(*down, grade_of(down[0], GAIN_LIMITS)),
-        Graded(abs(phase.value), phase.omega, grade_of(abs(phase.value), PHASE_LIMITS)),
-        Graded(None if delay is None else type(delay)(1e3 * delay), None, grade_of(periods, PERIOD_LIMITS)),
-        Graded(peak.value, peak.omega, grade_of(peak.value, PEAK_LIMITS)),
-    )
-    worst = max((each.grade for each in graded), key=GRADES.index)
-    names = [name for name, each in zip(GRADED.values(), graded, strict=True) if each.grade == worst != GOOD]
-    return dict(zip(GRADED, graded, strict=True)) | {
+    graded = {
+        "gain_margin": Graded(*up, grade_of(up[0], "gain")),
+        "gain_reduction": Graded(*down, grade_of(down[0], "gain")),
+        "phase_margin": Graded(phase, band.phase_margin.omega, grade_of(phase, "phase")),
+        "delay_margin": Graded(milliseconds, None, grade_of(periods, "periods")),
+        "peak_sensitivity": Graded(*peak, grade_of(peak.value, "peak")),
+    }
+    # "-" of a margin that is not defined
+    worst = max((each.grade for each in graded.values()), key=("-", "good", "low", "poor").index)
+    return graded | {
         "grade": worst,
-        "limited_by": tuple(names),
+        "limited_by": tuple(GRADED[key] for key, each in graded.items() if each.grade == worst != "good"),
         "delay_margin_periods": periods,
         "disk_margin": band.disk,
     }
 
 
-def grade_of(size: float | None, limits: tuple[float, float]) -> str:
-    """Grade of a margin by the limits of good and low: least values where they descend, else greatest ones."""
+def grade_of(size: float | None, margin: str) -> str:
+    """Return the grade of a margin by its `GRADE_LIMITS`: least values where they descend, else greatest ones."""
     if size is None:
-        return UNDEFINED
-    sign = 1.0 if limits[0] > limits[1] else -1.0
-    good, low = (sign * size >= sign * limit for limit in limits)
-    if good:
-        return GOOD
-    if low:
-        return LOW
-    return POOR
+        return "-"
+    good, low = GRADE_LIMITS[margin]
+    sign = math.copysign(1.0, good - low)
+    if sign * size >= sign * good:
+        return "good"
+    if sign * size >= sign * low:
+        return "low"
+    return "poor"

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import cached_property
-from typing import Annotated, Any, NamedTuple, cast
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -15,29 +15,20 @@ from tfarm.crossing import Window
 from tfarm.dsp import Chain
 from tfarm.dsp.stages import admit_case
 from tfarm.errors import ConvergenceError, one_line, require
-from tfarm.loop.circle_crossings import FACTOR, stable_windows
-from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.margins import Margins
 from tfarm.loop.margins import margins as margins_of
-from tfarm.loop.plane import Plane, cell_middles, gain_map, plane, ranges_of
+from tfarm.loop.plane import Plane, gain_map
+from tfarm.loop.plane_axes import cell_middles, ranges_of
 from tfarm.loop.poles import HUB, closed_loop_poles, poles_by_mode
-from tfarm.loop.sampled_verdict import (
-    SAMPLED_LOOP,
-    Analysis,
-    SampledBrief,
-    brief_of,
-    sampled_brief,
-    sampled_verdict,
-)
+from tfarm.loop.sampled_analysis import Analysis
+from tfarm.loop.sampled_brief import SampledBrief, brief_of, sampled_brief
+from tfarm.loop.sampled_verdict import SAMPLED_LOOP, sampled_verdict
 from tfarm.records import frozen
 from tfarm.response.frequency import Bode, bode, resonant_band
 from tfarm.schema import Difference, Percent, Quantity, compare_records
 from tfarm.spectrum import damped_modes
 from tfarm.spectrum import modes as modes_of
 from tfarm.spectrum.gains import default_gains
-
-# of a continuous-time controller: where that plane ends, and values that are counted
-FACTORS = 40
 
 
 class ArmMode(NamedTuple):
@@ -102,20 +93,21 @@ class ComparedSide:
 
     @property
     def verdict(self) -> str:
-        """Of the continuous-time loop, or of the sampled one where there is no other."""
+        """Verdict on the continuous-time loop, or on the sampled one where there is no other."""
         return self.loop.verdict.word
 
     @property
-    def oscillating(self) -> Complex:
+    def oscillating_poles(self) -> Complex:
         """The closed-loop poles with Im s > 0, ascending in Im s."""
         return self.poles[self.poles.imag > 0]
 
     @cached_property
     def named_poles(self) -> list[PoleOfMode]:
         """The oscillating poles by mode, then those of none, ascending in Im s."""
-        found = poles_by_mode(self.oscillating, self.open_loop)
+        found = poles_by_mode(self.oscillating_poles, self.open_loop)
         names = {s: f"mode {mode}" if mode != HUB else "the hub" for mode, s in found.items()}
-        names |= {s: "none" for s in self.oscillating.tolist() if s not in names}
+        for s in self.oscillating_poles.tolist():
+            names.setdefault(s, "none")
         return [PoleOfMode(name, abs(s), Percent(-s.real / abs(s) + 0.0), s) for s, name in names.items()]
 
     @property
@@ -136,18 +128,6 @@ class ComparedSide:
         if in_band is None:
             return None
         return self.loop.delay_margin_seconds or in_band.delay
-
-    def reach(self, delay: Real) -> list[Sequence[Window]]:
-        """The intervals of a factor on the law in which its loop is stable, at each further delay [s]."""
-        # of a continuous-time controller: where that plane ends, and values that are counted
-        most_factor = 4.0
-        if self.is_sampled:
-            loop = cast("Analysis", self.loop).loop
-            late = loop.chain.sampling.delay_samples + delay / loop.chain.sampling.period
-            return [stable_windows(loop.with_delay(each), FACTOR) for each in late.tolist()]
-        in_s = ContinuousLoop(self.case)
-        factors = cell_middles(0.0, most_factor, FACTORS)
-        return [*plane(in_s, ("delay", "gain"), in_s.law.delay + delay, factors).stable_intervals]
 
 
 class SideRow(NamedTuple):
@@ -250,14 +230,14 @@ class Comparison:
             help="pole pairs of a mode that the other loop has none of, or of no mode",
         ),
     ]:
-        """The other oscillating poles."""
-        pairs = (("first", self.one, self.other), ("second", self.other, self.one))
-        return [
-            LonePole(which, side.name, row.mode, row.pole)
-            for which, side, partner in pairs
-            for row in side.named_poles
-            if row.mode == "none" or row.mode not in {each.mode for each in partner.named_poles}
-        ]
+        """Oscillating poles of one side alone, or of no mode."""
+        first, second = ({row.mode for row in side.named_poles} - {"none"} for side in self.sides)
+        paired = first & second
+        found = []
+        for which, side in zip(("first", "second"), self.sides, strict=True):
+            alone = (row for row in side.named_poles if row.mode not in paired)
+            found += [LonePole(which, side.name, row.mode, row.pole) for row in alone]
+        return found
 
     @property
     def margin_differences(
@@ -281,7 +261,7 @@ class Comparison:
 
     @property
     def sides(self) -> tuple[ComparedSide, ComparedSide]:
-        """Both."""
+        """Both sides."""
         return self.one, self.other
 
     @property
@@ -292,10 +272,11 @@ class Comparison:
     @property
     def verdict(self) -> str:
         """Both verdicts, a line each."""
-        each = ("" if self.is_sampled else f"{side.verdict}, " for side in self.sides)
-        return "\n".join(
-            f"{s.name}: {verdict}{s.sampled.short}" for s, verdict in zip(self.sides, each, strict=True)
-        )
+        lines = []
+        for side in self.sides:
+            continuous = "" if self.is_sampled else f"{side.verdict}, "
+            lines.append(f"{side.name}: {continuous}{side.sampled.short}")
+        return "\n".join(lines)
 
     @property
     def is_of_arms(self) -> bool:
@@ -305,9 +286,8 @@ class Comparison:
     @cached_property
     def responses(self) -> list[Bode]:
         """The exact response of both arms over one band, which holds ten flexible modes of each."""
-        bands = [resonant_band(side.arm) for side in self.sides]
-        band = min(low for low, _ in bands), max(high for _, high in bands)
-        return [bode(side.arm, self.output, band) for side in self.sides]
+        lows, highs = zip(*(resonant_band(side.arm) for side in self.sides), strict=True)
+        return [bode(side.arm, self.output, (min(lows), max(highs))) for side in self.sides]
 
     @cached_property
     def regions(self) -> list[Plane] | None:
@@ -331,9 +311,9 @@ class Comparison:
     def reaches(self) -> tuple[Real, list[list[Sequence[Window]]]]:
         """Further delays [s], to two samples or beyond both margins, and the stable factors on each law there."""
         T = self.one.sampled.period
-        longest = max(2.0 * T, *(1.2 * (each.delay_margin or 0.0) for each in self.sides))
-        delay = np.linspace(0.0, min(longest, 10.0 * T), 25)
-        return delay, [each.reach(delay) for each in self.sides]
+        margins = [each.delay_margin or 0.0 for each in self.sides]
+        delay = np.linspace(0.0, min(max(2.0 * T, 1.2 * max(margins)), 10.0 * T), 25)
+        return delay, [each.loop.factor_intervals(delay) for each in self.sides]
 
 
 def compare(
@@ -361,8 +341,8 @@ def compare(
     called = [one_line(name, longest_side_name) for name in names or _names(cases)]
     require(len(called) == 2, "names", called, "two names")
     first, second = (case.arm for case in cases)
-    must_have_free_hub(first)
-    must_have_free_hub(second)
+    for arm in (first, second):
+        must_have_free_hub(arm)
     remedy = f"gains of {called[0]} are in another unit, its input being {first.input}: give both one input"
     require(first.input_unit == second.input_unit, "input", second.input, remedy)
     is_sampled = any(case.law.is_discrete for case in cases)
@@ -374,30 +354,36 @@ def _cases(
     arms: Arm | Sequence[Arm], laws: AnyLaw | Sequence[AnyLaw] | None, chain: Chain | None
 ) -> list[Case]:
     """Return both arms with their laws."""
-    given = _listed(arms)
-    some = [] if laws is None else _listed(laws)
-    is_two = 1 <= len(given) <= 2 and len(some) <= 2 and max(len(given), len(some)) == 2
-    require(
-        is_two, "compare", f"{len(given)} arms, {len(some)} laws", "give two arms, or one arm and two laws"
-    )
+    given = _as_list(arms)
+    some = [] if laws is None else _as_list(laws)
+    counts = len(given), len(some)
+    is_two = counts[0] > 0 and max(counts) == 2
+    require(is_two, "compare", "{} arms, {} laws".format(*counts), "give two arms, or one arm and two laws")
     pair = given * (2 // len(given))
-    each = some * (2 // len(some)) if some else map(default_gains, pair)
+    some = some or [default_gains(arm) for arm in pair]
+    each = some * (2 // len(some))
     return [Case(arm, law, chain) for arm, law in zip(pair, each, strict=True)]
 
 
-def _listed(given: Any) -> list[Any]:
+def _as_list(given: Any) -> list[Any]:
     """Return one or several as a list."""
     return list(given) if isinstance(given, list | tuple) else [given]
 
 
 def _names(cases: list[Case]) -> Sequence[str]:
     """Return the arms' names where they differ, else the laws', else their numbers."""
-    laws = []
-    for case in cases:
-        gains = case.gains
-        laws.append(", ".join(gains.gain_text(n, "{:.4g}".format) for n in PLANE) if gains else case.law.name)
-    arms = [case.arm.name for case in cases]
-    return next((names for names in (arms, laws) if names[0] != names[1]), ("first", "second"))
+    names = [case.arm.name for case in cases]
+    if names[0] == names[1]:
+        names = [_law_name(case) for case in cases]
+    return ("first", "second") if names[0] == names[1] else names
+
+
+def _law_name(case: Case) -> str:
+    """Return the gains of a law at the hub in words, the name of another one."""
+    gains = case.gains
+    if gains is None:
+        return case.law.name
+    return ", ".join(gains.gain_text(n, "{:.4g}".format) for n in PLANE)
 
 
 def _side(name: str, case: Case, count: int, is_sampled: bool) -> ComparedSide:
@@ -432,38 +418,41 @@ def _side(name: str, case: Case, count: int, is_sampled: bool) -> ComparedSide:
 
 
 def _modes_of_arm(arm: Arm, count: int, most: int) -> tuple[list[ArmMode], dict[int, complex]]:
-    """The first `count` flexible modes of an arm, and its poles [1/s] by mode, of `most` flexible ones.
+    """Return the first `count` flexible modes of an arm, and its poles [1/s] by mode, of `most` flexible ones.
 
     Damping ratios that could not be found, or not for one mode, are None; the poles are then the undamped ones.
     """
     found = modes_of(arm, count)
     more = modes_of(arm, most)
     poles = dict(zip(more.index.tolist(), (1j * more.natural_frequency).tolist(), strict=True))
-    ratio: dict[int, float] = dict.fromkeys(poles, 0.0) if arm.is_undamped else {}
-    with suppress(ConvergenceError):
-        for damped in map(damped_modes, [] if arm.is_undamped else [found, more]):
-            known = damped.is_assigned
-            index = damped.index[known].tolist()
-            ratio = dict(zip(index, damped.damping_ratio[known].tolist(), strict=True)) | ratio
-            poles |= dict(zip(index, damped.eigenvalues[known, 0].tolist(), strict=True))
+    ratio = {}
+    if arm.is_undamped:
+        ratio = dict.fromkeys(poles, Percent(0.0))
+    else:
+        with suppress(ConvergenceError):
+            for damped in map(damped_modes, (found, more)):
+                known = damped.is_assigned
+                index = damped.index[known].tolist()
+                ratio = dict(zip(index, map(Percent, damped.damping_ratio[known]), strict=True)) | ratio
+                poles |= dict(zip(index, damped.eigenvalues[known, 0].tolist(), strict=True))
     flexible = zip(found.index.tolist(), found.natural_frequency.tolist(), strict=True)
-    rows = [ArmMode(n, omega, Percent(ratio[n]) if n in ratio else None) for n, omega in flexible if n > 0]
-    return rows, poles
+    return [ArmMode(n, omega, ratio.get(n)) for n, omega in flexible if n > 0], poles
 
 
 def _sampled_poles(found: Analysis, most: int) -> tuple[Complex, dict[int, complex]]:
-    """The first poles s = ln(z)/T [1/s] of a sampled loop with Im s >= 0, ascending in Im s, that outlive a sample.
+    """Return the first poles s = ln(z)/T [1/s] of a sampled loop with Im s >= 0, ascending in Im s.
 
-    And those of the rig by itself, by flexible mode, 0 for none.
+    They are those of which more than a thousandth is left after a sample; and return those of the rig by itself, by
+    flexible mode, 0 for none.
     """
     T = found.loop.chain.sampling.period
     pulse = found.loop.pulse
     z = found.loop.poles.z
     # but for rounding
     z = np.where(abs(z.imag) <= 1e-12, z.real, z)
-    # of others a thousandth is left after a sample
     s = np.log(z[(abs(z) > 1e-3) & (z.imag >= 0)]) / T
     upper = pulse.poles.imag > 0
     own = np.log(pulse.multipliers[upper]) / T
-    by_mode = zip(pulse.mode[upper].tolist(), (own.real + 1j * abs(own.imag)).tolist(), strict=True)
-    return np.asarray(s[np.lexsort((s.real, s.imag))][:most]), dict(by_mode)
+    own = own.real + 1j * abs(own.imag)
+    by_mode = dict(zip(pulse.mode[upper].tolist(), own.tolist(), strict=True))
+    return np.asarray(s[np.lexsort((s.real, s.imag))][:most]), by_mode

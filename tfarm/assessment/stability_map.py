@@ -11,29 +11,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import GAINS, PLANE, Arm, shown_unit
+from tfarm.arm import PLANE, Arm, shown_unit
+from tfarm.arm.feedback import OUTPUT_OF
 from tfarm.arrays import Complex, Real
 from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
 from tfarm.loop.circle_crossings import (
     GainMap,
+    add_columns,
     ends_of_K1,
-    rounded_map,
+    refine_map,
     sampled_map,
     with_both_sides,
-    with_more,
 )
-from tfarm.loop.plane import (
-    Axis,
-    BoundaryLines,
-    Plane,
-    boundary_lines,
-    gain_map,
-    moment_axis,
-    rate_axis,
-    rate_columns,
-)
+from tfarm.loop.plane import BoundaryLines, Plane, boundary_lines, gain_map, moment_axis
+from tfarm.loop.plane_axes import Axis, rate_axis, rate_columns
 from tfarm.loop.sampled import Sampled
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.records import frozen
@@ -42,7 +35,7 @@ from tfarm.spectrum.gains import default_gains
 from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.judge import damping_of
 from tfarm.synthesis.models import continuous_model
-from tfarm.synthesis.structures import ONE, Entry
+from tfarm.synthesis.structures import Entry
 
 # of the gain that balances a torque: 1 where the input is one, less for a motor's current
 K2_RANGE = (-1.0, 1.5)
@@ -71,13 +64,10 @@ class StableRegions(NamedTuple):
         for plane in self.sampled:
             C = plane.loop.plant.arm.damping
             regions["sampled_K2_intervals" if own == C else f"sampled_at_C_{C:g}_s"] = plane.stable_intervals
-        return [
-            Column(PLANE[0], of=self.continuous.x),
-            *(
-                Column(key, of=[tuple(map(float, np.ravel(x))) for x in each])
-                for key, each in regions.items()
-            ),
-        ]
+        columns = [Column(PLANE[0], of=self.continuous.x)]
+        for key, intervals in regions.items():
+            columns.append(Column(key, of=[tuple(map(float, np.ravel(each))) for each in intervals]))
+        return columns
 
 
 def stable_regions(case: Case) -> StableRegions:
@@ -91,20 +81,23 @@ def stable_regions(case: Case) -> StableRegions:
     ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
     ends = ends[ends > 0]
     ends = ends[np.diff(ends, prepend=0.0) > 1e-3 * ends]
-    span, cut = (arm.input_per_torque * np.array(ends) for ends in (K2_RANGE, CUT_RANGE))
+    unit = arm.input_per_torque
+    cut = unit * np.array(CUT_RANGE)
     # beyond all that is stable
     low = gains.K1 / 15.0
     top = 1.7 * max([gains.K1, *ends])
     across = with_both_sides(np.geomspace(low, top, OVERLAY_COLUMNS), ends)
+    across = across[(low <= across) & (top >= across)]
     # about the width of the picture over its height
     wide = 1.8 / np.log(top / low)
+    tall = np.ptp(unit * np.array(K2_RANGE))
 
     def drawn(K1: Real, K2: Real) -> Complex:
-        return np.asarray(wide * np.log(K1) + 1j * K2 / np.ptp(span))
+        return np.asarray(wide * np.log(K1) + 1j * K2 / tall)
 
-    planes = [outline_region(loop, across[(low <= across) & (top >= across)], cut, drawn) for loop in loops]
+    planes = [outline_region(loop, across, cut, drawn) for loop in loops]
     every = np.unique(np.concatenate([plane.x for plane in planes]))
-    return StableRegions(gain_map(arm, every, cut), tuple(with_more(plane, every) for plane in planes))
+    return StableRegions(gain_map(arm, every, cut), tuple(add_columns(plane, every) for plane in planes))
 
 
 @lru_cache(maxsize=8)
@@ -115,16 +108,18 @@ def sampled_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GainMap | None:
         across = with_both_sides(rate_columns(arm, x, SAMPLED_COLUMNS), ends_of_K1(loop))
         across = across[(x.low <= across) & (x.high > across)]
         up = np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE])
-        return outline_region(
-            loop, across, up, lambda K1, K2: np.asarray(1.5 * x.place(K1) + 1j * y.place(K2))
-        )
+
+        def drawn(K1: Real, K2: Real) -> Complex:
+            return np.asarray(1.5 * x.place(K1) + 1j * y.place(K2))
+
+        return outline_region(loop, across, up, drawn)
     except ConvergenceError:
         return None
 
 
 def outline_region(loop: Sampled, across: Real, up: Real, drawn: Callable[[Real, Real], Complex]) -> GainMap:
     """Return the sampled region cut at these K1, and between them where its outline as it is `drawn` has corners."""
-    return rounded_map(sampled_map(loop, across, up), drawn)
+    return refine_map(sampled_map(loop, across, up), drawn)
 
 
 # ------------------------------------------------------------ the map
@@ -169,7 +164,7 @@ class StabilityMap:
             for K1, K2, omega in self.boundary.points.tolist()
             if not math.isnan(K1)
         ]
-        rate = "_".join([PLANE[0], *shown_unit(PLANE[0], self.arm).replace("/", " ").split()])
+        rate = "_".join(f"{PLANE[0]} {shown_unit(PLANE[0], self.arm)}".replace("/", " ").split())
         keys = "what", rate, PLANE[1], "unstable_poles", "least_damping_ratio", "omega_rad_s"
         return [Column(key, of=of) for key, of in zip(keys, zip(*rows, strict=True), strict=True)]
 
@@ -180,9 +175,8 @@ def stability_map(arm: Arm, chain: Chain) -> StabilityMap:
     y = moment_axis(arm, x)
     found = gain_map(arm, x.grid(GRID_COLUMNS), y.grid(GRID_ROWS))
     # damping at one in four of its values
-    across, up = (
-        np.r_[axis.low, each[2::4], axis.high] for axis, each in zip((x, y), found.axes, strict=True)
-    )
+    across = np.r_[x.low, found.x[2::4], x.high]
+    up = np.r_[y.low, found.y[2::4], y.high]
     coarse = gain_map(arm, across, up)
     sampled = sampled_region(arm, x, y, chain)
     return StabilityMap(arm, x, y, found, boundary_lines(found, x, y), coarse, least_damping(coarse), sampled)
@@ -193,8 +187,8 @@ def least_damping(plane: Plane) -> Real:
 
     It is that of a model of eight modes: right to a few digits, more than a contour shows.
     """
-    signals = tuple(each.output for name in PLANE for each in GAINS if each.name == name)
+    signals = tuple(OUTPUT_OF[name] for name in PLANE)
     model = continuous_model(plane.arm, signals, DESIGNED_MODES, 8, first_frequency(plane.arm))
     grids = np.meshgrid(*plane.axes)
-    laws = [Entry(name, grid.reshape(1, -1), ONE) for name, grid in zip(signals, grids, strict=True)]
+    laws = [Entry(name, grid.reshape(1, -1)) for name, grid in zip(signals, grids, strict=True)]
     return damping_of(model, model.poles(laws)).reshape(grids[0].shape)

@@ -5,39 +5,32 @@ samples.  An initial deflection is the first mode of the arm without controller,
 one pair of exponentials at any damping, so the response of the loop to it is exact.  (The static shape under a force at
 the tip is an equilibrium only where the hub is kept at its angle.)
 
-Figures, as in textbooks (Ogata, Modern Control Engineering, 2010, sec. 5-3): the final value is the mean of the last
-tenth of the record; rise time from 10 to 90 % of it; overshoot beyond it, over it.  Settling counts from the end of the
-motion, within 2 % of the travel as in python-control and MATLAB.  Of a signal without a reference, and of root moment
-and torque, the share is of the largest deviation from the final value: as for `tfarm simulate`, which reads the samples
-alone.
-
-A figure is not determined where the bound on the error of the signal leaves 1 % of it open.  A peak is enclosed between
-the largest |y| less its bound there and the largest |y| plus bound of the whole record, on both sides of its jumps.
+The figures are those of `tfarm.assessment.signal_figures`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 
 from tfarm.arm import AT_HUB, AnyLaw, Arm, Law
-from tfarm.arm.chain import PERIOD, TIME_ROUNDING
+from tfarm.arm.chain import PERIOD
 from tfarm.arm.checks import number
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import LEAST_SIZE, Real
-from tfarm.assessment.card import loop_names
+from tfarm.assessment.card import loops_by_name
+from tfarm.assessment.signal_figures import LoopRecord, LoopResponse, SignalCurve, signal_unit
 from tfarm.case import Case
-from tfarm.digits import general
 from tfarm.dsp import Chain, traces
 from tfarm.dsp.plant import sensed_plant
 from tfarm.dsp.results import ENOUGH_CHANGE, simulate_modes
 from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, describe_scenario, rest_scenario, scenario
-from tfarm.dsp.simulate import MOST_BETWEEN, SETTLING_BAND, final_value, first_mode, settling_time
+from tfarm.dsp.simulate import MOST_BETWEEN, SETTLING_BAND, first_mode
 from tfarm.dsp.stages import admit_case, not_covered
 from tfarm.errors import must_be_known, require
 from tfarm.loop.continuous import ContinuousLoop
@@ -48,14 +41,13 @@ from tfarm.loop.time_response import (
     ACTUATOR,
     TORQUE,
     Excitation,
-    Peak,
     TimeResponse,
     Transform,
     time_response,
     usual_poles,
 )
 from tfarm.records import frozen
-from tfarm.response.signals import ControllerSignals, controller, locate_output
+from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Column, Percent, Quantity, Table, across
 from tfarm.schema.html import as_html
 from tfarm.spectrum.table import first_frequency
@@ -81,274 +73,10 @@ CONSUMER = Consumer(
     ),
     none=("volts",),
 )
-# by scenario
-SAMPLED_NAMES = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}
-MOMENT = AT_HUB[-1]
-UNSTABLE = "unstable"
-# times [s], values, bounds of their errors, and the peak where known
-SignalCurve = tuple[Real, Real, Real, Peak | None]
-PARTS = ("hub", "tip", "root_moment", "torque")
-# of a figure: more than its error may be is not determined
-OPEN = 0.01
-
-
-class Millimetres(float):
-    """A length [m] that a person reads in mm."""
-
-    def as_text(self, digits: int) -> str:
-        """The number of mm."""
-        return general(1e3 * self, digits)
-
-
-@dataclass(frozen=True, kw_only=True)
-class SignalFigures:
-    """Figures of one signal over time, in its own unit; None where the signal, or the record, has none."""
-
-    signal: Annotated[str, Quantity(help="output of the arm, or torque for its input")]
-    unit: Annotated[str, Quantity(help="SI unit of the values of the signal")]
-    peak: Annotated[
-        float | None,
-        Quantity(
-            "peak",
-            digits=6,
-            unit_of="unit",
-            help="largest value in size, with its sign, on both sides of jumps",
-        ),
-    ]
-    peak_time: Annotated[float | None, Quantity("peak time", "s", 4, help="time of the peak")]
-    final_value: Annotated[
-        float | None,
-        Quantity(
-            "final value",
-            digits=4,
-            unit_of="unit",
-            help="mean over the last tenth of the record; none where the signal has not settled",
-        ),
-    ]
-    rise_time: Annotated[
-        float | None,
-        Quantity(
-            "rise time (10-90 %)",
-            "s",
-            4,
-            help="time from 10 to 90 % of the final value, of a signal with a reference",
-        ),
-    ]
-    overshoot: Annotated[
-        Percent | None,
-        Quantity(
-            "overshoot", "", 4, help="excess of the largest value over the final one, as a share of that"
-        ),
-    ]
-    settling_time: Annotated[
-        float | None,
-        Quantity(
-            "settling time",
-            "s",
-            4,
-            help="time from the end of the motion after which deviations stay within the settling band of the travel, "
-            "or of the largest deviation where there is no reference",
-        ),
-    ]
-    at_rest_after: Annotated[
-        float | None, Quantity("at rest after", "s", 4, help="end of the motion plus settling time")
-    ]
-    steady_state_error: Annotated[
-        float | None,
-        Quantity("steady-state error", digits=4, unit_of="unit", help="reference less final value"),
-    ]
-    residual_rms: Annotated[
-        float | None,
-        Quantity(
-            "residual vibration (rms)",
-            digits=4,
-            unit_of="residual_unit",
-            help="rms about the final value once the slew or the pulse is over",
-        ),
-    ]
-    remainder_bound: Annotated[
-        float | None,
-        Quantity(
-            "remainder bound at the peak",
-            digits=2,
-            unit_of="unit",
-            help="of the error at the peak, as measured; at least the rounding of the peak",
-        ),
-    ]
-    note: Annotated[
-        str | None, Quantity("not determined", help="figures without a value, with their reason")
-    ] = None
-
-    @property
-    def residual_unit(self) -> str:
-        """Unit of the residual for a person."""
-        return "mm" if isinstance(self.residual_rms, Millimetres) else self.unit
 
 
 @frozen(kw_only=True)
-class LoopResponse:
-    """Figures of one loop, not defined of an unstable one, and its signals by name, "torque" being the input."""
-
-    stability: Annotated[str, Quantity("stability", help="stable, marginal or unstable")]
-    certainty: Annotated[
-        str,
-        Quantity("certainty", help="by the remainder of the poles or by twice the modes, with their number"),
-    ]
-    signals: dict[str, Real]
-    hub: Annotated[
-        SignalFigures | None, Quantity("hub", help="hub angle, or hub rate where that is the reference")
-    ] = None
-    tip: Annotated[
-        SignalFigures | None, Quantity("tip", help="tip displacement, or its velocity under a hub rate")
-    ] = None
-    root_moment: Annotated[
-        SignalFigures | None, Quantity("root moment", help="elastic moment at the root")
-    ] = None
-    torque: Annotated[
-        SignalFigures | None,
-        Quantity("torque", help="input of the arm by the motor: torque, voltage or current"),
-    ] = None
-
-
-@dataclass(frozen=True)
-class _LoopRecord:
-    """Times [s] of the signals of a loop, the names of those of hub and tip, root moment and torque, and references.
-
-    `busy_until` [s] is the end of the input, `band` the share of the travel within which a signal settles.
-    """
-
-    arm: Arm
-    names: tuple[str, ...]
-    busy_until: float
-    t: Real
-    reference: Mapping[str, Real]
-    band: float
-
-    def _of_continuous(self, response: TimeResponse, omitted: str) -> LoopResponse:
-        """The continuous-time loop; `omitted` ends its certainty."""
-        # of the peak of each signal: bound on its error, everywhere in the record, of a converged response
-        converged = 1e-6
-        t = np.union1d(self.t, response.near_starts(float(self.t[-1])))
-        y = response.at(t)
-        t = np.union1d(t, self._crossings(t, dict(zip(response.names, y, strict=True))))
-        y = response.at(t)
-        bound = response.remainder(t)
-        peaks = response.peaks(t)
-        curves = {name: (t, y[n], bound[n], peaks[name]) for n, name in enumerate(response.names)}
-        is_converged = all(
-            (error <= converged * abs(peak.value)).all() and peak.bound <= converged * abs(peak.value)
-            for _, _, error, peak in curves.values()
-        )
-        word = verdict_on(response.poles.loop).word
-        count = f"{response.poles.count} poles{omitted}"
-        return self._loop(word, is_converged, count, curves)
-
-    def _of_sampled(self, case: Case, task: Scenario, names: Sequence[str]) -> LoopResponse:
-        """The sampled loop, with the signals of these names."""
-        between = round(task.period / self.t[1]) - 1
-        run, used = simulate_modes(case, task, between=between, outputs=names)
-        signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in names}
-        signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
-        is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
-        word = UNSTABLE if run.stopped else sampled_verdict(case).word
-        curves = {name: (self.t[: y.size], y, 0 * y, None) for name, y in signals.items()}
-        return self._loop(word, is_converged, f"{used.modes} modes", curves)
-
-    def _loop(
-        self, stability: str, is_converged: bool, count: str, curves: Mapping[str, SignalCurve]
-    ) -> LoopResponse:
-        """The figures of a loop; of an unstable one those of its signals are left out."""
-        names = zip(PARTS, self.names, strict=True) if stability != UNSTABLE else ()
-        of = {part: self._figures(name, *curves[name]) for part, name in names}
-        signals = {name: y[np.isin(t, self.t)] for name, (t, y, *_) in curves.items()}
-        certainty = f"{'converged' if is_converged else 'approximate'}, {count}"
-        return LoopResponse(stability=stability, certainty=certainty, signals=signals, **of)
-
-    def _figures(self, name: str, t: Real, y: Real, bound: Real, peak: Peak | None = None) -> SignalFigures:
-        """Figures of one signal at times `t` with a bound on its error; its peak is the largest there unless given."""
-        # of the largest value of a signal: figures of its values below a hundredth of that are 0
-        resolved = 1e-3
-        n = int(abs(y).argmax())
-        peak = peak or Peak(float(t[n]), float(y[n]), 0.0, abs(float(y[n])))
-        size = max(abs(peak.value), LEAST_SIZE)
-        step = float(self.t[1])
-        known = self._values(name, t, y, 0 * bound)
-        below = self._values(name, t, y, -bound)
-        above = self._values(name, t, y, bound)
-        least = {"overshoot": 0.01, "settling_time": step / OPEN, "rise_time": step / OPEN}
-        spread = {
-            key: _spread(value, (below[key], above[key]), least.get(key, resolved * size))
-            for key, value in known.items()
-        }
-        spread["peak"] = (peak.most - abs(peak.value) + peak.bound) / size
-        if peak.bound > resolved * OPEN * size:
-            largest = t[abs(y) + bound >= abs(peak.value) - peak.bound]
-        else:
-            largest = t[:0]
-        late = float(np.ptp(np.r_[peak.time, largest])) - 2 * step
-        spread["peak_time"] = late / max(peak.time, self.t[-1] / 10)
-        known |= {"peak": peak.value, "peak_time": peak.time}
-        words = []
-        for key, share in spread.items():
-            if share > OPEN:
-                known[key] = None
-                words.append(f"{key.replace('_', ' ')}: remainder {100 * share:.2g} %")
-        if math.isinf(peak.most):
-            known |= dict.fromkeys(("peak", "peak_time", "settling_time"))
-            words = ["impulse"]
-        settled = known["settling_time"]
-        return SignalFigures(
-            signal=name,
-            unit=signal_unit(self.arm, name),
-            **known,
-            note="; ".join(words) or None,
-            at_rest_after=None if settled is None else self.busy_until + settled,
-            remainder_bound=peak.bound or None,
-        )
-
-    def _values(self, name: str, t: Real, y: Real, more: Real) -> dict[str, Any]:
-        """Figures but the peak of a signal, `more` being added to it and to its deviations."""
-        final, away, scale = self._deviations(name, t, y)
-        settled = settling_time(t, np.maximum(away + more, 0), scale, self.busy_until, self.band)
-        after = t >= self.busy_until * (1 - TIME_ROUNDING)
-        names = ("final_value", "rise_time", "overshoot", "steady_state_error", "residual_rms")
-        values: dict[str, Any] = {**dict.fromkeys(names), "settling_time": settled}
-        if self.busy_until and after.sum() > 1:
-            unit = Millimetres if name == "tip_displacement" else float
-            values["residual_rms"] = unit(
-                np.sqrt(np.trapezoid((y - final)[after] ** 2, t[after]) / np.ptp(t[after]))
-            )
-        if settled is not None:
-            final += float(more.mean())
-            values["final_value"] = final if name != MOMENT or not self.arm.has_rigid_mode else None
-            if final and name in self.reference:
-                share = (y + more) / final
-                values["rise_time"] = _reached(t, share, 0.9) - _reached(t, share, 0.1)
-                values["overshoot"] = Percent(max(0.0, float(share.max()) - 1))
-                values["steady_state_error"] = float(self.reference[name][-1]) - final
-        return values
-
-    def _deviations(self, name: str, t: Real, y: Real) -> tuple[float, Real, float]:
-        """Final value of a signal, deviations from it, and the scale of its settling band."""
-        is_even = np.isin(t, self.t)
-        final = final_value(t[is_even], y[is_even])
-        away = abs(y - final)
-        return final, away, abs(final - float(y[0])) if name in self.reference else float(away.max())
-
-    def _crossings(self, t: Real, signals: Mapping[str, Real]) -> Real:
-        """Times [s] in the last records in which a signal may cross its settling band, 16 in each."""
-        found = []
-        for name in self.names:
-            _, away, scale = self._deviations(name, t, signals[name])
-            bend = np.r_[0.0, abs(np.diff(away, 2)), 0.0]
-            reach = abs(np.diff(away)) + np.maximum(bend[:-1], bend[1:])
-            places = np.flatnonzero(abs(away - self.band * scale)[:-1] <= reach)[-50:]
-            found.append(np.linspace(t[places], t[places + 1], 17).ravel())
-        return np.concatenate(found)
-
-
-@frozen(kw_only=True)
-class Step(_LoopRecord):
+class Step(LoopRecord):
     """Time responses of an arm under a controller, continuous-time and sampled, at the times `t` [s].
 
     A law in z has no continuous-time loop; the signals of a sampled loop end where it was stopped.  `names` are the
@@ -368,16 +96,16 @@ class Step(_LoopRecord):
     @property
     def loops(self) -> dict[str, LoopResponse]:
         """The loops by name."""
-        names = loop_names(self.period)
-        return {name: loop for name, loop in zip(names, (self.continuous, self.sampled), strict=True) if loop}
+        return loops_by_name(self.period, self.continuous, self.sampled)
 
     @property
     def finding(self) -> Annotated[str, Quantity("finding", help="stability of each loop")]:
         """Stability of each loop."""
-        grows = " (the response grows, its figures are not defined)"
-        return "; ".join(
-            f"{name} {each.stability}{'' if each.hub else grows}" for name, each in self.loops.items()
-        )
+        words = []
+        for name, loop in self.loops.items():
+            remark = "" if loop.hub else " (the response grows, its figures are not defined)"
+            words.append(f"{name} {loop.stability}{remark}")
+        return "; ".join(words)
 
     @property
     def settling_band(
@@ -397,26 +125,16 @@ class Step(_LoopRecord):
     @property
     def csv_table(self) -> Table:
         """The signals of both loops at the same times, empty where a run was stopped."""
-        signals = (
-            Column(
-                prefix + name,
-                unit=signal_unit(self.arm, name),
-                of=[*y.tolist(), *[""] * (self.t.size - y.size)],
-            )
-            for prefix, loop in (("", self.continuous), ("sampled_", self.sampled))
-            for name, y in (loop.signals.items() if loop else ())
-        )
-        return Table(columns=(Column("t", "time", "s", of=self.t), *signals))
+        columns = [Column("t", "time", "s", of=self.t)]
+        for prefix, loop in zip(("", "sampled_"), (self.continuous, self.sampled), strict=True):
+            signals = loop.signals if loop else {}
+            for name, y in signals.items():
+                cells = [*y.tolist(), *[""] * (self.t.size - y.size)]
+                columns.append(Column(prefix + name, unit=signal_unit(self.arm, name), of=cells))
+        return Table(columns=tuple(columns))
 
     def _repr_html_(self) -> str:
         return as_html(self.table)
-
-
-def signal_unit(arm: Arm, name: str) -> str:
-    """SI unit of a signal, or of the input as "torque"."""
-    if name == TORQUE:
-        return arm.input_unit
-    return locate_output(name, arm.length)[0].unit
 
 
 def step(
@@ -454,14 +172,15 @@ def step(
     ConvergenceError
         Where the poles of the loop are not complete.
     """
-    must_be_known("scenario", scenario_name, SAMPLED_NAMES)
+    # names of the sampled loop
+    scenarios = {"reference": "reference", "slew": "slew", "pulse": "pulse", "deflection": "decay"}
+    must_be_known("scenario", scenario_name, scenarios)
     band = number("settling_band", settling_band, "a share of the travel, such as 0.02")
-    require(
-        0 < band < 1, "settling_band", settling_band, "a share of the travel between 0 and 1, such as 0.02"
-    )
+    remedy = "a share of the travel between 0 and 1, such as 0.02"
+    require(0 < band < 1, "settling_band", settling_band, remedy)
     case = admit_case(CONSUMER, Case(arm, law, chain))
     is_step = scenario_name == "reference"
-    hub = AT_HUB[0]
+    hub, _, root_moment = AT_HUB
     if is_step:
         hub, own = step_reference(case.law)
         case = case.under(own)
@@ -472,11 +191,10 @@ def step(
     if is_step:
         task = rest_scenario("reference", arm, chain, length, hub)
     else:
-        task = scenario(SAMPLED_NAMES[scenario_name], arm, chain, length)
+        task = scenario(scenarios[scenario_name], arm, chain, length)
     require(task.t.size > 1, "duration", length, f"at least one sampling period, {task.period:g} s")
-    of_angle = hub == AT_HUB[0]
-    tip = "tip_displacement" if of_angle else f"velocity@{arm.length!r}"
-    names = tuple(dict.fromkeys((hub, tip, MOMENT, *outputs)))
+    tip = "tip_displacement" if hub == AT_HUB[0] else f"velocity@{arm.length!r}"
+    names = tuple(dict.fromkeys((hub, tip, root_moment, *outputs)))
     if task.tip_offset:
         first_mode(
             sensed_plant(arm, Chain(), ("tip_displacement",), 1).unfiltered, task.tip_offset, scenario_name
@@ -485,22 +203,70 @@ def step(
     if poles is not None:
         response = time_response(poles, names, excitation(poles.loop, case, task, names), length)
     t = _times(response, task)
-    angle = traces.reference_angle(task, t) if of_angle else np.ones(t.size)
-    reference = {hub: angle, tip: arm.reach * angle} if is_step or scenario_name == "slew" else {}
-    found = _LoopRecord(arm, (*names[:3], TORQUE), task.busy_until, t, reference, band)
+    reference = _references(task, t, hub, tip, arm.reach)
+    record = LoopRecord(arm, (hub, tip, root_moment, TORQUE), task.busy_until, t, reference, band)
+    sampled = sampled_response(record, case, task, names)
+    continuous = None
+    if response is not None:
+        continuous = continuous_response(record, response, not_covered(CONTINUOUS, chain))
     return Step(
-        **vars(found),
+        **vars(record),
         controller=controller(case.law, arm),
         scenario=scenario_name,
         period=task.period,
         duration=min(length, float(t[-1])),
         scenario_in_words=describe_scenario(task, arm, chain),
         response=response,
-        sampled=found._of_sampled(case, task, names),
-        continuous=None
-        if response is None
-        else found._of_continuous(response, not_covered(CONTINUOUS, chain)),
+        sampled=sampled,
+        continuous=continuous,
     )
+
+
+def _references(task: Scenario, t: Real, hub: str, tip: str, reach: float) -> dict[str, Real]:
+    """Return the references of hub and tip at times t [s]; a pulse and a deflection have none."""
+    if task.name not in ("reference", "slew"):
+        return {}
+    angle = traces.reference_angle(task, t) if hub == AT_HUB[0] else np.ones(t.size)
+    return {hub: angle, tip: reach * angle}
+
+
+def continuous_response(record: LoopRecord, response: TimeResponse, omitted: str) -> LoopResponse:
+    """Return the response of the continuous-time loop at the times of a record; `omitted` ends its certainty."""
+    t = np.union1d(record.t, response.near_starts(float(record.t[-1])))
+    t = np.union1d(t, _band_crossings(record, t, dict(zip(response.names, response.at(t), strict=True))))
+    peaks = response.peaks(t)
+    curves = {
+        name: SignalCurve(t, y, bound, peaks[name])
+        for name, y, bound in zip(response.names, response.at(t), response.remainder(t), strict=True)
+    }
+    is_converged = all(curve.is_converged for curve in curves.values())
+    word = verdict_on(response.poles.loop).word
+    return record.of_loop(word, is_converged, f"{response.poles.count} poles{omitted}", curves)
+
+
+def sampled_response(record: LoopRecord, case: Case, task: Scenario, names: Sequence[str]) -> LoopResponse:
+    """Return the response of the sampled loop at the times of a record, with the signals of these names."""
+    between = round(task.period / record.t[1]) - 1
+    run, used = simulate_modes(case, task, between=between, outputs=names)
+    signals = {name: traces.continuous(run, name)[1][: record.t.size] for name in names}
+    t = record.t[: signals[names[0]].size]
+    signals[TORQUE] = traces.held_at(run, run.torque, t)
+    curves = {name: SignalCurve(t, y, 0 * y) for name, y in signals.items()}
+    is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
+    word = "unstable" if run.stopped else sampled_verdict(case).word
+    return record.of_loop(word, is_converged, f"{used.modes} modes", curves)
+
+
+def _band_crossings(record: LoopRecord, t: Real, signals: Mapping[str, Real]) -> Real:
+    """Return times [s] in the last records in which a signal may cross its settling band, 16 in each."""
+    found = []
+    for name in record.names:
+        _, away, scale = record.deviations(name, t, signals[name])
+        bend = np.r_[0.0, abs(np.diff(away, 2)), 0.0]
+        reach = abs(np.diff(away)) + np.maximum(bend[:-1], bend[1:])
+        places = np.flatnonzero(abs(away - record.band * scale)[:-1] <= reach)[-50:]
+        found.append(np.linspace(t[places], t[places + 1], 17).ravel())
+    return np.concatenate(found)
 
 
 def step_reference(law: Law) -> tuple[str, Law]:
@@ -516,7 +282,7 @@ def step_reference(law: Law) -> tuple[str, Law]:
 
 
 def usual_duration(poles: Poles | None, chain: Chain) -> float:
-    """Length [s] of a record: a slew and eight time constants of the dominant pole, to two digits."""
+    """Return the length [s] of a record: a slew and eight time constants of the dominant pole, to two digits."""
     # of the dominant pole: length of a record after its input, to 3e-4 of the final value
     time_constants = 8.0
     rise = chain.slew.rise_time
@@ -539,7 +305,7 @@ def excitation(loop: ContinuousLoop, case: Case, task: Scenario, names: Sequence
     for name in (*law.references, *law.wanted):
         must_be_known("references", name.removeprefix(REFERENCE), AT_HUB)
     if task.tip_offset:
-        return _released(loop, task.tip_offset, names)
+        return _free_motion(loop, task.tip_offset, names)
     arm = loop.arm
     rise = case.chain.slew.rise_time
     angle, rate, moment = AT_HUB
@@ -549,7 +315,8 @@ def excitation(loop: ContinuousLoop, case: Case, task: Scenario, names: Sequence
         free: dict[str, Transform] = {TORQUE: lambda s: -size / s}
         return Excitation({ACTUATOR: lambda s: size / s}, (0.0, task.busy_until), (1.0, -1.0), free=free)
     if task.name == "reference":
-        return Excitation(_through(law, {angle if task.hub_angle[0] else rate: lambda s: 1 / s}))
+        hub = angle if task.hub_angle[0] else rate
+        return Excitation(_inputs(law, {hub: lambda s: 1 / s}))
     a = case.chain.slew.acceleration(arm.reach)
     read = arm.gauged_inertia * float(task.reading == "vibration")
     references: dict[str, Transform] = {
@@ -557,54 +324,42 @@ def excitation(loop: ContinuousLoop, case: Case, task: Scenario, names: Sequence
         rate: lambda s: 1 / s**2,
         moment: lambda s: -read / s,
     }
-    inputs = {**_through(law, references), ACTUATOR: lambda s: arm.turned_inertia / s + arm.rate_loss / s**2}
+    inputs = {**_inputs(law, references), ACTUATOR: lambda s: arm.turned_inertia / s + arm.rate_loss / s**2}
     return Excitation(inputs, (0.0, rise / 2, rise), (a, -2 * a, a))
 
 
-def _through(law: Law, references: Mapping[str, Transform]) -> dict[str, Transform]:
-    """References as inputs of a law: of its signals, and with the opposite sign those of its columns."""
+def _inputs(law: Law, references: Mapping[str, Transform]) -> dict[str, Transform]:
+    """Return references as inputs of a law: of its signals, and with the opposite sign those of its columns."""
     own = {name: X for name, X in references.items() if name in law.references}
-    wanted = {REFERENCE + name: X for name, X in references.items() if REFERENCE + name in law.wanted}
-    return own | {name: lambda s, X=X: -X(s) for name, X in wanted.items()}
+    columns = {REFERENCE + name: X for name, X in references.items() if REFERENCE + name in law.wanted}
+    return own | {name: lambda s, X=X: -X(s) for name, X in columns.items()}
 
 
-def _released(loop: ContinuousLoop, offset: float, names: Sequence[str]) -> Excitation:
-    """The first mode released: the free motion of each signal."""
+def _free_motion(loop: ContinuousLoop, offset: float, names: Sequence[str]) -> Excitation:
+    """Return the motion of each signal as the first mode is released, with this offset of the tip."""
     signals = tuple(dict.fromkeys(("tip_displacement", *loop.law.signals, *names)))
     plant = sensed_plant(loop.arm, Chain(), signals, 1).unfiltered
     first, amplitude = first_mode(plant, offset, "deflection")
     p = complex(plant.poles[first])
+    q = p.conjugate()
     pairs = zip(signals, plant.residues[:, first] * amplitude, strict=True)
-    free = {name: lambda s, r=r: r / (s - p) + r.conjugate() / (s - p.conjugate()) for name, r in pairs}
+    free = {name: lambda s, r=r: r / (s - p) + r.conjugate() / (s - q) for name, r in pairs}
     return Excitation({}, poles=(p,), free=free)
 
 
 def _times(response: TimeResponse | None, task: Scenario) -> Real:
-    """Times [s] of a record: the samples and times between them, which resolve the fastest mode that shows."""
+    """Return the times [s] of a record: samples, and times between them that resolve the fastest mode that shows."""
     T = task.period
     n = task.t.size
     finest = (n - 1) * T / 2000
     if response is not None:
-        z, amplitudes = (np.hstack([part.late[n] for part in response.parts]) for n in (0, 1))
-        sizes = abs(amplitudes[:-1])
+        z = np.hstack([part.late[0] for part in response.parts])
+        sizes = abs(np.hstack([part.late[1] for part in response.parts])[:-1])
         shows = (sizes > traces.VISIBLE * sizes.max(axis=1, keepdims=True)).any(axis=0)
         fastest = max(z.imag[shows].max(initial=0.0), LEAST_SIZE)
         finest = min(finest, 2 * math.pi / (traces.POINTS_A_PERIOD * fastest))
-    steps = int(np.clip(math.ceil(T / finest), 1, min(MOST_BETWEEN, max(1, 20_000 // n))))
+    # of a record: at most 20,000 times, if that many samples are left
+    most = min(MOST_BETWEEN, max(1, 20_000 // n))
+    steps = min(max(math.ceil(T / finest), 1), most)
     k = np.arange((n - 1) * steps + 1)
     return T * (k // steps + k % steps / steps)
-
-
-def _spread(value: float | None, others: Sequence[float | None], floor: float) -> float:
-    """Largest difference of other values from a value, over its size or a floor; inf where only one of both exists."""
-    if value is None or None in others:
-        return 0.0 if {value, *others} == {None} else math.inf
-    return max(abs((each or 0.0) - value) for each in others) / max(abs(value), floor, LEAST_SIZE)
-
-
-def _reached(t: Real, share: Real, level: float) -> float:
-    """Time [s] at which a signal first reaches a level, by a line between two records."""
-    n = int((share >= level).argmax())
-    if n:
-        return float(np.interp(level, share[n - 1 : n + 1], t[n - 1 : n + 1]))
-    return float(t[0])

@@ -173,7 +173,7 @@ def map_plane(
     vary: twice: two numbers of a law and their ranges; gain (a factor on the law), delay, SIGNAL, SIGNAL.num.N or
         SIGNAL.den.N
     """
-    from tfarm.loop.plane import cell_middles, ranges_of
+    from tfarm.loop.plane_axes import cell_middles, ranges_of
 
     controller: AnyLaw
     typed = {RATE_GAIN: k1, MOMENT_GAIN: k2}

@@ -38,7 +38,7 @@ sampled = moved_module(
     f"{__name__}.sampled", dict.fromkeys(("Sampled", "sampled_loop"), "tfarm.loop.sampled")
 )
 _MOVED = {
-    "Analysis": "tfarm.loop.sampled_verdict",
+    "Analysis": "tfarm.loop.sampled_analysis",
     "GainMap": "tfarm.loop.circle_crossings",
     "Sampled": "tfarm.loop.sampled",
     "Verdict": "tfarm.loop.sampled_verdict",

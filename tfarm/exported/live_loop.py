@@ -20,13 +20,9 @@ from tfarm.arm.stages import Consumer
 from tfarm.arm.writing import law_toml
 from tfarm.arrays import Complex
 from tfarm.assessment.card import (
-    GAIN_LIMITS,
+    GRADE_LIMITS,
     GRADED,
-    PEAK_LIMITS,
-    PERIOD_LIMITS,
-    PHASE_LIMITS,
-    UNDAMPED,
-    reference_damping,
+    graded_arm,
 )
 from tfarm.assessment.stability_map import BEYOND_PICTURE, sampled_region
 from tfarm.case import Case
@@ -41,7 +37,8 @@ from tfarm.loop.circle_crossings import GainMap
 from tfarm.loop.continuous import ContinuousLoop, steep_places
 from tfarm.loop.edges import LONGEST_DELAY_SAMPLES
 from tfarm.loop.panels import Sensor, loop_panels, positions, sensed_places
-from tfarm.loop.plane import Axis, Plane, gain_map, moment_axis, rate_axis, rate_columns
+from tfarm.loop.plane import Plane, gain_map, moment_axis
+from tfarm.loop.plane_axes import Axis, rate_axis, rate_columns
 from tfarm.loop.sampled import Sampled
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import band_of_family, stability
@@ -185,7 +182,7 @@ def _of_any_law(case: Case, corners: Sequence[Case], unit: Law | None = None) ->
         **sensor_numbers(arm),
         "period": period,
         "longest_delay": LONGEST_DELAY_SAMPLES * period,
-        "limits": {"gain": GAIN_LIMITS, "phase": PHASE_LIMITS, "periods": PERIOD_LIMITS, "peak": PEAK_LIMITS},
+        "limits": GRADE_LIMITS,
         **samples,
         **_known(arm, is_quiet, unit is None),
         "graded": _graded(case, corners, unit) if arm.has_elastic_link else None,
@@ -220,13 +217,12 @@ def _samples(case: Case, corners: Sequence[Case], unit: Law | None) -> tuple[Liv
 
 def _graded(case: Case, corners: Sequence[Case], unit: Law | None) -> LiveNumbers:
     """Return the loop with whose damping an undamped arm is graded, and the words for that: `tfarm.assessment.card`."""
-    C = reference_damping(case.arm)
-    damped = case.arm.having(damping=C)
+    damped, words = graded_arm(case.arm)
     samples, _ = _samples(case.on(damped), [each.on(damped) for each in corners], unit)
     return samples | {
         "kind": "band",
         "sampled_loop": _in_page(case.on(damped), unit),
-        "words": UNDAMPED.format(C),
+        "words": words,
     }
 
 

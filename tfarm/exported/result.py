@@ -22,7 +22,7 @@ from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, must_be_known, require
 from tfarm.exported.texts import facts_of
 from tfarm.files import move_into, place_in
-from tfarm.loop.sampled_verdict import Analysis, sampled
+from tfarm.loop.sampled_analysis import Analysis, sampled
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.gains import default_gains

@@ -33,6 +33,7 @@ from tfarm.crossing import (
 from tfarm.crossing.shown import PlaneOfCounts
 from tfarm.crossing.turning import loose_columns
 from tfarm.loop.sampled import OfLoop, Sampled
+from tfarm.loop.sampled_poles import SampledPoles
 from tfarm.loop.sampled_rig import CircleGrid
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -40,14 +41,12 @@ from tfarm.spectrum.gains import most_gain
 
 # the name of a factor on the whole law
 FACTOR = "gain"
-# K2 at which upright edges are searched, times `input_per_torque`
-ENDS_AT = (-0.9, 0.3, 0.9)
 # of K1 in a picture
 MOST_COLUMNS = 400
 
 
 def line_of(loop: Sampled, name: str) -> Line:
-    """The line of one number of the law, or of `FACTOR`.  A gain at the hub ends at `most_gain`."""
+    """Return the line of one number of the law, or of `FACTOR`.  A gain at the hub ends at `most_gain`."""
     # with more its gain is beyond any number
     most_factor = 1e9
     unit = np.zeros(loop.row.size)
@@ -75,25 +74,25 @@ def crossings_along(grid: CircleGrid, lines: Sequence[Line]) -> list[Crossings]:
     at_end = grid.rig.terms(np.array([-1.0 + 0j]), None, np.ones(1))[:, 0]
     for line, here in zip(lines, crossings(grid, lines), strict=True):
         others, alone, low, high = line
-        ways = [1 if ((others @ rows) * (alone @ rows).conj()).imag >= 0 else -1 for rows in (first, last)]
-        here.append(Crossing(_real_gain(others @ at_end, alone @ at_end), math.pi, ways[1]))
+        begins, ends = (((others @ rows) * (alone @ rows).conj()).imag >= 0 for rows in (first, last))
+        here.append(Crossing(_real_gain(others @ at_end, alone @ at_end), math.pi, 1 if ends else -1))
         (lowest, at_one), (least, moving) = (_lowest(grid.rig.near_one(each)) for each in (others, alone))
         # A and B are of the same order in x = 1 - 1/z, or A is of a higher one: it crosses at 0
         if least <= lowest:
             static = _real_gain(at_one, moving) if least == lowest else 0.0
-            here.append(Crossing(static, 0.0, -ways[0]))
+            here.append(Crossing(static, 0.0, -1 if begins else 1))
         found.append(Crossings.of(here).within(low, high))
     return found
 
 
 def _lowest(terms: Sequence[tuple[int, float]]) -> tuple[float, float]:
-    """The lowest power of x in a sum of c x^n, and its coefficient."""
+    """Return the lowest power of x in a sum of c x^n, and its coefficient."""
     lowest = min((order for order, _ in terms), default=math.inf)
     return lowest, sum(value for order, value in terms if order == lowest)
 
 
 def _real_gain(A: Any, B: Any) -> float:
-    """The real gain g of A + g B = 0 where A and B are real; inf where there is none."""
+    """Return the real gain g of A + g B = 0 where A and B are real; inf where there is none."""
     # 1e-12 of the terms without a gain: smaller terms of the gain are rounding
     if abs(B.real) > 1e-12 * abs(A.real):
         return float(-A.real / B.real)
@@ -106,14 +105,14 @@ def _real_gain(A: Any, B: Any) -> float:
 def windows_on_circle(loop: Sampled, names: Sequence[str]) -> dict[str, list[Window]]:
     """Return every stability interval of some numbers of the law, the others constant, confirmed by the poles."""
     lines = [line_of(loop, name) for name in names]
-    windows = []
+    windows = {}
     for name, line, found in zip(names, lines, crossings_along(loop.rig.grid, lines), strict=True):
 
         def is_stable(value: float, line: Line = line) -> bool:
             return loop.weighted((line.others + value * line.alone)[1:].tolist()).is_stable
 
-        windows.append(confirm_intervals(found, 0.0 if name == FACTOR else -math.inf, math.inf, is_stable))
-    return dict(zip(names, windows, strict=True))
+        windows[name] = confirm_intervals(found, 0.0 if name == FACTOR else -math.inf, math.inf, is_stable)
+    return windows
 
 
 def stable_windows(loop: Sampled, name: str) -> list[Window]:
@@ -122,7 +121,7 @@ def stable_windows(loop: Sampled, name: str) -> list[Window]:
 
 
 def interval_around(windows: list[Window], gain: float) -> Window | None:
-    """The interval that contains a gain."""
+    """Return the interval that contains a gain."""
     return next((window for window in windows if window[0] < gain < window[1]), None)
 
 
@@ -180,41 +179,42 @@ def sampled_map(
     most_gains = 4000
     x = check_ascending(vary[0], x, 1, most_gains)
     y = check_ascending(vary[1], y, 1, most_gains)
+    column, row = vary
     across, up = (loop.place(name) for name in vary)
     if up is None and across is not None:
-        turned = sampled_map(loop, y, x, (vary[1], vary[0]))
-        return GainMap(loop, vary, turned.y, turned.x, turned.unstable.T, [])
-    loops = {value: loop.having(vary[0], value) for value in x.tolist()}
+        mirrored = sampled_map(loop, y, x, (row, column))
+        return GainMap(loop, vary, mirrored.y, mirrored.x, mirrored.unstable.T, [])
+    loops = {value: loop.having(column, value) for value in x.tolist()}
+    columns = loops.values()
+
+    def poles_at(each: Sampled, value: float) -> SampledPoles:
+        return each.having(row, value).poles
+
     if up is None:
-        points = [[each.having(vary[1], value) for value in y.tolist()] for each in loops.values()]
-        return GainMap(
-            loop, vary, x, y, np.array([[each.poles.unstable for each in row] for row in points]), []
-        )
+        counts = [[poles_at(each, value).unstable for value in y.tolist()] for each in columns]
+        return GainMap(loop, vary, x, y, np.array(counts), [])
     at = _off_the_edge(y)
-    lines = [line_of(each, vary[1]) for each in loops.values()]
     if across is None:
-        there = np.array([each.having(vary[1], at).poles.unstable for each in loops.values()])
-        found = [
-            crossings_along(each.rig.grid, [line])[0]
-            for each, line in zip(loops.values(), lines, strict=True)
-        ]
+        there = np.array([poles_at(each, at).unstable for each in columns])
+        found = [crossings_along(each.rig.grid, [line_of(each, row)])[0] for each in columns]
     else:
         # all loops have one grid, and a count in one column those of the row
-        start = loop.having(vary[0], _off_the_edge(x)).having(vary[1], at)
-        row, *found = crossings_along(loop.rig.grid, [line_of(start, vary[0]), *lines])
-        there = start.poles.unstable + row.passed(x) - row.passed(start.number(vary[0]))
+        start = loop.having(column, _off_the_edge(x)).having(row, at)
+        lines = [line_of(each, row) for each in columns]
+        along, *found = crossings_along(loop.rig.grid, [line_of(start, column), *lines])
+        there = start.poles.unstable + along.passed(x) - along.passed(start.number(column))
     plane = GainMap(loop, vary, x, y, counts_over(y, found, at, there), found)
 
-    def counted(first: float, second: float) -> int | None:
-        poles = loops[first].having(vary[1], second).poles
+    def count(first: float, second: float) -> int | None:
+        poles = poles_at(loops[first], second)
         # 1e-9 of ln|z|: a pole nearer to the circle may be counted on either side
         return poles.unstable if abs(poles.log_radius).min() >= 1e-9 else None
 
-    plane.must_agree(counted, "crossings and eigenvalues differ")
+    plane.must_agree(count, "crossings and eigenvalues differ")
     return plane
 
 
-def rounded_map(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainMap:
+def refine_map(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainMap:
     """Return the same region at more values of K1, until the corners of its drawn outline are those of the region.
 
     `drawn` maps points of the plane to the picture, 1 high.
@@ -224,39 +224,42 @@ def rounded_map(plane: GainMap, drawn: Callable[[Real, Real], Complex]) -> GainM
         more = loose_columns(plane.x, pieces(plane.x, plane.stable_intervals), drawn)
         if not more.size or plane.x.size + more.size > MOST_COLUMNS:
             break
-        plane = with_more(plane, more)
+        plane = add_columns(plane, more)
     return plane
 
 
-def with_more(plane: GainMap, x: Real) -> GainMap:
-    """The map of two gains with further values across."""
+def add_columns(plane: GainMap, x: Real) -> GainMap:
+    """Return the map of two gains with further values across."""
     fresh = np.setdiff1d(x, plane.x)
     if not fresh.size:
         return plane
     more = sampled_map(plane.loop, fresh, plane.y, plane.vary)
-    order = np.argsort(both := np.r_[plane.x, fresh], kind="stable")
+    both = np.r_[plane.x, fresh]
+    order = np.argsort(both, kind="stable")
     found = plane.crossings + more.crossings
     unstable = np.concatenate([plane.unstable, more.unstable])
     return replace(plane, x=both[order], unstable=unstable[order], crossings=[found[n] for n in order])
 
 
-def ends_of_K1(loop: Sampled) -> Real:
-    """Ends of stability intervals of K1 at a few K2, without 0: upright edges of the region."""
+def ends_of_K1(loop: Sampled, shares: Sequence[float] = (-0.9, 0.3, 0.9)) -> Real:
+    """Return the ends of stability intervals of K1 at a few K2, without 0: upright edges of the region.
+
+    K2 are `shares` of `input_per_torque`.
+    """
     unit = loop.plant.arm.input_per_torque
-    found = [window for K2 in ENDS_AT for window in stable_windows(loop.having("K2", unit * K2), "K1")]
-    return np.array(sorted({end for window in found for end in window if math.isfinite(end) and end}))
+    windows = (stable_windows(loop.having("K2", unit * share), "K1") for share in shares)
+    ends = np.unique(np.concatenate([np.ravel(each) for each in windows]))
+    return ends[np.isfinite(ends) & (ends != 0)]
 
 
 def with_both_sides(K1: Real, ends: Real) -> Real:
-    """Values of K1, ascending, with both sides of each upright edge."""
+    """Return values of K1, ascending, with both sides of each upright edge."""
     # relative: distance to either side of such an edge at which a region is cut
     off_edge = 1e-9
-    return np.unique(np.concatenate([K1, ends * (1 - off_edge), ends * (1 + off_edge)]))
+    return np.unique(np.r_[K1, ends * (1 - off_edge), ends * (1 + off_edge)])
 
 
 def _off_the_edge(values: Real) -> float:
-    """A gain inside the range that is on no rounded edge."""
+    """Return a gain inside the range that is on no rounded edge."""
     # the golden section of a range is on no rounded number and no grid
-    if values.size > 1:
-        return float(values[0] + 0.6180339887498949 * (values[-1] - values[0]))
-    return float(values[0])
+    return float(values[0] + 0.6180339887498949 * (values[-1] - values[0]))

@@ -47,21 +47,14 @@ from tfarm.spectrum.table import first_frequency
 
 # of w1: far right, where L of an improper law must fall, and poles come from infinity
 FAR_RIGHT = (1e5, 1e6, 1e7)
-# of w1: where a signal is tested for being fed back at all; no law has its zero there
-SOMEWHERE = 0.31 + 0.71j
 # of w1: where a function, its zeros at 0 divided out, is taken for its value at 0
 NEAREST_TO_ORIGIN = 1e-12
 # of w1: where the order of a zero at s = 0 is read off
 ORDER_READ_AT = (2e-5, 1e-5)
-# distances from a steep place, as shares of its frequency
 # of the first steep place: where a grid begins, as nothing bends there
 SLOWEST = 1e-6
 # times a band: the end of the range beyond it in which |L| is evaluated, two decades of its fall
 QUIET_REACH = 100.0
-# evaluated in it: 20 ms
-MOST_RESONANCES = 2000
-# points, and three at each: a contour that the loops of other laws have too, whose values are kept
-LONG_PATH = 1000
 # flexible: in a band; beyond, poles are not determined without a theorem or small gain
 MOST_BAND_MODES = 150
 
@@ -81,12 +74,12 @@ class ContinuousLoop(Loop):
         must_have_free_hub(self.arm)
         remedy = "a law in z has a sampled loop: ask for that, or leave the period out of a law in s"
         require(not self.law.is_discrete, "period", self.law.period, remedy)
-        given: Signals | None = self.signals
-        if given is None or given.names != self.law.signals or given.arm != self.arm:
+        known: Signals | None = self.signals
+        if known is None or known.names != self.law.signals or known.arm != self.arm:
             object.__setattr__(self, "signals", self.case.signals)
         if self.gains is not None:
             # searches under other laws may come to values next to 0
-            _must_be_possible(self.arm, self.gains, LEAST_UNITS if given is None else 0.0)
+            _must_be_possible(self.arm, self.gains, LEAST_UNITS if known is None else 0.0)
         _must_not_be_algebraic(self)
 
     @property
@@ -133,19 +126,24 @@ class ContinuousLoop(Loop):
     @cached_property
     def feeds_back(self) -> bool:
         """Whether the law feeds anything back."""
-        return bool(self.law.polynomials(np.array([SOMEWHERE * first_frequency(self.arm)]))[0].any())
+        return bool(self._sample_numerators.any())
+
+    @property
+    def _sample_numerators(self) -> Complex:
+        """Numerators of the signals (signals,) at a place where no law has its zero: 0 of one that is not fed back."""
+        numerators, _ = self.law.polynomials(np.array([(0.31 + 0.71j) * first_frequency(self.arm)]))
+        return numerators[:, 0]
 
     @cached_property
     def is_lossless(self) -> bool:
         """Whether D is real on the imaginary axis, and its zeros come in pairs +-s: energy is conserved."""
         if not self.feeds_back:
             return self.arm.is_undamped
+        if not (self.arm.is_reactive and self.law.is_static):
+            return False
         odd = np.array([each.power % 2 for each in self.signals.outputs])
-        return (
-            self.arm.is_reactive
-            and self.law.is_static
-            and not (odd @ abs(self.law.polynomials(np.ones(1, complex))[0])).any()
-        )
+        numerators, _ = self.law.polynomials(np.ones(1, complex))
+        return not (odd @ abs(numerators)).any()
 
     @property
     def k(self) -> System:
@@ -158,12 +156,12 @@ class ContinuousLoop(Loop):
         return feedback(self.k, self.law, self.signals.outputs, self.signals.places)
 
     def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
-        """Denominator and numerator of L at s, up to one factor: finite at poles too."""
+        """Return denominator and numerator of L at s, up to one factor: finite at poles too."""
         s = np.asarray(s, dtype=complex)
         return self._parts(s, self.signals.kept(s))
 
     def _parts(self, s: Complex, of_rig: LoopParts) -> tuple[Complex, Complex]:
-        """The same from those of the signals."""
+        """Return the same from those of the signals."""
         entries, whole = self.law.polynomials(s)
         return of_rig.drive * whole, np.exp(-s * self.law.delay) * (entries * of_rig.numerators).sum(axis=0)
 
@@ -172,10 +170,12 @@ class ContinuousLoop(Loop):
         """Order of the zero of D at s = 0: the least order of its terms, and more where these cancel."""
         integrators = int((self.law.poles == 0).sum())
         terms = [self.k.at_rest + integrators]
-        (numerators,) = self.law.polynomials(np.array([SOMEWHERE * first_frequency(self.arm)]))[0].T
-        for name, order, numerator in zip(self.law.signals, self.signals.orders, numerators, strict=True):
+        rows = zip(self.law.signals, self.signals.orders, self._sample_numerators, strict=True)
+        for name, order, numerator in rows:
             for part in self.law.parts if numerator else ():
-                own = part.block.zeros_at_origin(part.signals.index(name)) if name in part.signals else None
+                if name not in part.signals:
+                    continue
+                own = part.block.zeros_at_origin(part.signals.index(name))
                 # and the integrators of the other parts
                 if own is not None:
                     terms.append(order + own + integrators - int((part.block.poles == 0).sum()))
@@ -199,21 +199,31 @@ class ContinuousLoop(Loop):
         return round(float(np.log2(abs(farther / nearer)))) if cancels else 0
 
     def characteristic(self, s: Complex) -> tuple[Complex, Complex]:
-        """D e^{-scale} and scale at s."""
-        of_rig = (self.signals.kept if s.size >= LONG_PATH else self.signals.parts)(s)
+        """Return D e^{-scale} and scale at s."""
+        of_rig = rig_parts(self.signals, s)
         drive, fed_back = self._parts(s, of_rig)
         return drive + fed_back, of_rig.scale
 
     def function(self, s: Complex) -> Analytic:
-        """D/s^n, n = `zeros_at_origin`, with slopes from differences."""
+        """Return D/s^n, n = `zeros_at_origin`, with slopes from differences."""
         s = np.where(s == 0, NEAREST_TO_ORIGIN * first_frequency(self.arm), np.asarray(s, dtype=complex))
         return by_differences(self.k, self.characteristic, s, self.zeros_at_origin)
+
+
+def rig_parts(signals: Signals, s: Complex) -> LoopParts:
+    """Return the terms of the rig at s; those on a long path are kept."""
+    # points, and three at each: a contour that the loops of other laws have too
+    long_path = 1000
+    return signals.kept(s) if s.size >= long_path else signals.parts(s)
 
 
 def by_differences(
     k: System, characteristic: Callable[[Complex], tuple[Complex, Complex]], s: Complex, at_zero: int
 ) -> Analytic:
-    """D/s^at_zero at s (n,), not 0, with slopes from differences; `characteristic` gives D e^{-scale} and scale."""
+    """Return D/s^at_zero at s (n,), not 0, with slopes from differences.
+
+    `characteristic` gives D e^{-scale} and scale.
+    """
     h = difference_steps(k, s)
     # far from where it is large: no number, and no start
     with np.errstate(over="ignore", invalid="ignore"):
@@ -258,7 +268,7 @@ def _must_be_possible(arm: Arm, gains: HubFeedback, least: float) -> None:
 
 @lru_cache(maxsize=ARMS_KEPT)
 def steep_places(arm: Arm, up_to: float) -> Any:
-    """Natural frequencies [rad/s] with the arm's own hub, with a locked one and with none, ascending; read-only."""
+    """Return the natural frequencies [rad/s] with the arm's own hub, a locked one and none, ascending; read-only."""
     pin = replace(
         arm, hub=replace(arm.hub, inertia=0.0, friction=0.0, stiffness=0.0), motor=None, input="hub_torque"
     )
@@ -270,27 +280,22 @@ def steep_places(arm: Arm, up_to: float) -> Any:
 
 @lru_cache(maxsize=ARMS_KEPT)
 def grid(arm: Arm, up_to: float) -> Any:
-    """Frequencies [rad/s] from a millionth of the first natural one to `up_to`, dense at steep places; read-only."""
-    # distances from a steep place, as shares of its frequency
-    nearest_to_steep = 1e-10
-    farthest_from_steep = 0.06
-    # of a grid on either side of a steep place, one and a half a decade
-    points_near_steep = 14
-    # and between two of them
-    points_between_steep = 24
-    # of the end of a grid: the points of steep places up to there reach below it
-    steep_beyond = 1.05
-    # from there to that place, ten a decade
-    points_below_steep = 60
-    places = np.asarray(steep_places(arm, steep_beyond * up_to))
-    lowest = SLOWEST * min(up_to, places[0] if places.size else up_to)
-    away = np.geomspace(nearest_to_steep, farthest_from_steep, points_near_steep)
+    """Return frequencies [rad/s] from a millionth of the first natural one to `up_to`, dense at steep places.
+
+    The array is read-only.
+    """
+    # the points of steep places up to 1.05 times the end of a grid reach below it
+    places = np.asarray(steep_places(arm, 1.05 * up_to))
+    lowest = SLOWEST * min([up_to, *places[:1]])
+    # distances from a steep place to either side, as shares of its frequency, one and a half a decade
+    away = np.geomspace(1e-10, 0.06, 14)
     close = (places[:, None] * (1 + np.r_[-away[::-1], away])).ravel()
     corners = np.r_[lowest, places[places < up_to], up_to]
-    between = np.concatenate(
-        [np.linspace(a, b, points_between_steep, endpoint=False) for a, b in itertools.pairwise(corners)]
-    )
-    slow = np.geomspace(lowest, corners[1], points_below_steep)
+    # 24 points between two of them
+    pairs = itertools.pairwise(corners)
+    between = np.concatenate([np.linspace(low, high, 24, endpoint=False) for low, high in pairs])
+    # ten a decade up to the first of them
+    slow = np.geomspace(lowest, corners[1], 60)
     omega = np.unique(np.concatenate([close, between, slow]))
     omega = np.append(omega[(omega >= lowest) & (omega < up_to)], up_to)
     omega.flags.writeable = False
@@ -299,24 +304,26 @@ def grid(arm: Arm, up_to: float) -> Any:
 
 @lru_cache(maxsize=ARMS_KEPT)
 def frequency_above_mode(arm: Arm, number: int) -> float:
-    """A frequency [rad/s] half-way between two natural ones, with `number` flexible modes below."""
+    """Return a frequency [rad/s] half-way between two natural ones, with `number` flexible modes below."""
     omega = modes(arm, number + 1).natural_frequency
     return float((omega[-1] + omega[-2]) / 2)
 
 
 @lru_cache(maxsize=ARMS_KEPT)
 def quiet_places(arm: Arm, band: float, points: int) -> Any:
-    """Frequencies [rad/s] in two decades above a band, for the test of small gain of a damped loop; read-only.
+    """Return frequencies [rad/s] in two decades above a band, for the test of small gain of a damped loop; read-only.
 
     `points` of them have equal ratios.  The natural ones are added, as a resonance may be narrower than that spacing:
-    the first `MOST_RESONANCES`, up to where bending is overdamped, 2/C of the segment with the least C.
+    the first 2000, up to where bending is overdamped, 2/C of the segment with the least C.
     """
+    # evaluated in 20 ms
+    most_resonances = 2000
     places = band * np.geomspace(1.0, QUIET_REACH, points)
     if arm.least_damping:
-        first, last = (
-            modes_below(arm, min(end, 2 / arm.least_damping)) for end in (band, QUIET_REACH * band)
-        )
-        many = min(last - first, MOST_RESONANCES)
+        overdamped = 2 / arm.least_damping
+        first = modes_below(arm, min(band, overdamped))
+        last = modes_below(arm, min(QUIET_REACH * band, overdamped))
+        many = min(last - first, most_resonances)
         if many:
             places = np.unique(np.r_[places, modes(arm, first + many).natural_frequency[-many:]])
     places.flags.writeable = False

@@ -105,7 +105,7 @@ class LoopCurve:
 
     @property
     def curve(self) -> LoopCurve:
-        """Itself, as the curve of what has one."""
+        """Itself, as the curve of a record that has one."""
         return self
 
     @property
@@ -115,7 +115,7 @@ class LoopCurve:
 
 
 class LoopContour(NamedTuple):
-    """What Nyquist's criterion reads of a loop: its contour runs up the curve, and closes through points `closing`.
+    """Data of a loop for Nyquist's criterion: its contour runs up the curve, and closes through points `closing`.
 
     `grid` are frequencies [rad/s] that resolve L, `on_curve` those of the poles of L on the curve, `closed` the
     closed-loop poles s [1/s], Im s >= 0, apart from those at rest.  `unstable_open` poles of L are unstable, and
@@ -199,10 +199,8 @@ class LoopVerdict(ABC):
     def curve(self) -> LoopCurve:
         """The loop function on a grid that resolves it."""
         loop = self.full
-        omega = self.frequencies
-        omega, L = refine_frequencies(
-            loop.loop_function, omega[omega >= lowest_drawn(loop.arm, self.in_band)]
-        )
+        drawn = self.frequencies >= lowest_drawn(loop.arm, self.in_band)
+        omega, L = refine_frequencies(loop.loop_function, self.frequencies[drawn])
         return LoopCurve(
             arm=loop.arm,
             law=loop.law,
@@ -242,9 +240,9 @@ class LoopAnalysis(ABC):
 def next_limits(factors: Iterable[float]) -> tuple[float, float]:
     """Return the factors next to 1 on both sides, 0 and infinity where there are none."""
     factors = list(factors)
-    return max((t for t in factors if 0 <= t < 1), default=0.0), min(
-        (t for t in factors if t > 1), default=math.inf
-    )
+    lower = max((t for t in factors if 0 <= t < 1), default=0.0)
+    upper = min((t for t in factors if t > 1), default=math.inf)
+    return lower, upper
 
 
 def refine_frequencies(L: Callable[[Complex], Complex], omega: Real, rounds: int = 6) -> tuple[Real, Complex]:
@@ -264,20 +262,21 @@ def refine_frequencies(L: Callable[[Complex], Complex], omega: Real, rounds: int
 
 
 def lowest_drawn(arm: Arm, band: LoopMargins | None) -> float:
-    """A frequency [rad/s] below the first crossing and the first mode: further down L does not change."""
-    crossed = [] if band is None else [w for w, _ in (*band.gain_crossovers, *band.phase_crossovers) if w > 0]
-    return float(min([first_frequency(arm), *crossed])) / 20.0
+    """Return a frequency [rad/s] below the first crossing and the first mode: further down L does not change."""
+    crossovers = () if band is None else (*band.gain_crossovers, *band.phase_crossovers)
+    lowest = min((w for w, _ in crossovers if w > 0), default=math.inf)
+    return float(min(first_frequency(arm), lowest)) / 20.0
 
 
 def decibels(values: Complex | Real | float) -> Real:
-    """The size of values [dB]."""
+    """Return the size of values [dB]."""
     return np.asarray(20 * np.log10(np.maximum(np.abs(values), LEAST_SIZE)))
 
 
 def gain_margin(band: LoopMargins, factor: float) -> tuple[float, float | None]:
-    """Size [dB] of a factor that ends stability, and the frequency [rad/s] at which it does."""
+    """Return the size [dB] of a factor that ends stability, and the frequency [rad/s] at which it does."""
     # a larger margin is none
     if not 1e-9 < factor < 1e9:
         return math.inf, None
-    near = [w for w, t in band.phase_crossovers if abs(t / factor - 1) < 1e-6]
-    return abs(20 * math.log10(factor)), near[0] if near else None
+    near = (w for w, t in band.phase_crossovers if abs(t / factor - 1) < 1e-6)
+    return abs(20 * math.log10(factor)), next(near, None)

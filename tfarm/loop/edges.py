@@ -36,8 +36,6 @@ from tfarm.spectrum.table import first_frequency
 LONGEST_DELAY_SAMPLES = 20.0
 # of loops in which edges are searched
 MOST_EDGE_MODES = 64
-# that are printed where all are certified
-OTHER_DIGITS = 4
 
 # whether a loop is stable (None: not shown), and the band [rad/s] of that proof
 Proof = tuple[bool | None, float]
@@ -61,31 +59,30 @@ def delay_margin(loop: Sampled) -> DelayMargin:
     # of a scan of the delay
     most_steps = 2000
     now = loop.chain.sampling.delay_samples
+    T = loop.chain.sampling.period
 
     def log_radius(more: float) -> float:
         return loop.with_delay(now + more).poles.log_spectral_radius
 
     if log_radius(0.0) >= 0:
         return DelayMargin(0.0, False)
-    plant = loop.plant
-    T = loop.chain.sampling.period
+    poles = loop.plant.poles
     # 4 times the first-order shift of a pole by the feedback: a mode with more damping stays stable
-    reach = 4 * loop.push * abs(held_amplitude(plant.poles, T))
+    reach = 4 * loop.push * abs(held_amplitude(poles, T))
     # the feedback may exceed their own damping
-    risky = (reach > -plant.poles.real * T) & (plant.poles.imag > 0)
-    fastest = (plant.poles.imag[risky] * T).max(initial=np.pi / 4)
-    # 0.1 samples: 18 degrees of a pole at z = -1
-    # 12 steps a turn of the fastest mode that may be unstable
-    # samples
+    risky = (reach > -poles.real * T) & (poles.imag > 0)
+    fastest = (poles.imag[risky] * T).max(initial=np.pi / 4)
+    # 12 steps a turn of the fastest mode that may be unstable; 0.1 samples: 18 degrees of a pole at z = -1
     step = float(min(0.1, 2 * np.pi / fastest / 12))
     scanned = step * np.arange(min(most_steps, int(LONGEST_DELAY_SAMPLES / step)) + 1)
     for low, high in pairwise(scanned.tolist()):
         later = loop.with_delay(now + high)
         # 1e-6 within the circle: an eigenvalue there is not polished, as even a double one has an error of 1e-7
         if (abs(later.eigenvalues) > 1 - 1e-6).any() and not later.is_stable:
-            is_between = log_radius(low) < 0
             # a delay margin is known to 1e-10 samples
-            return DelayMargin(float(brentq(log_radius, low, high, xtol=1e-10)) if is_between else low, False)
+            is_between = log_radius(low) < 0
+            samples = float(brentq(log_radius, low, high, xtol=1e-10)) if is_between else low
+            return DelayMargin(samples, False)
     return DelayMargin(min(most_steps * step, LONGEST_DELAY_SAMPLES), True)
 
 
@@ -115,7 +112,8 @@ def damping_edge(loop: Sampled) -> float:
         return math.inf
     # 16 decades down from there
     for low in high / 10.0 ** np.arange(1, 16 + 1):
-        if log_radius(low) >= 0:  # a radius is nearly linear in C where C is small
+        if log_radius(low) >= 0:
+            # a radius is nearly linear in C where C is small
             # C is solved for to 4e-7, and then raised by more, so that the loop is stable there
             C = float(brentq(log_radius, low, 10 * low, xtol=1e-7 * low, rtol=4e-7))
             return C * (1 + 1e-6)
@@ -123,35 +121,36 @@ def damping_edge(loop: Sampled) -> float:
 
 
 def log_radius_with(loop: Sampled, C: float, count: int) -> float:
-    """The log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6."""
+    """Return the log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6."""
 
-    def damped(nudge: float) -> Sampled:
+    def loop_at(nudge: float) -> Sampled:
         arm = loop.plant.arm.having(damping=C * (1 + nudge))
         # 2 modes are kept beyond the last one that does not decay within a sample
         return loop.on(arm, min(count, 2 + count_lasting_modes(arm, loop.chain)))
 
     # shares of C, tried in turn where two damped modes are one at it
-    return first_distinct(damped, (0.0, 1e-6, -1e-6)).poles.log_spectral_radius
+    return first_distinct(loop_at, (0.0, 1e-6, -1e-6)).poles.log_spectral_radius
 
 
 def count_lasting_modes(arm: Arm, chain: Chain) -> int:
-    """Number of bending modes of a damped arm that outlive a sample, C w^2 T (1 - f)/2 below 40, and still ring.
+    """Return the number of bending modes of a damped arm that outlive a sample and still ring.
 
-    Overdamped modes have their slow poles next to -1/C, where those of the remainder are too.
+    They have C w^2 T (1 - f)/2 below 40.  Overdamped modes have their slow poles next to -1/C, where those of the
+    remainder are too.
     """
     C = arm.least_damping
     remaining = chain.sampling.period * (1 - chain.sampling.fraction)
-    return modes_below(arm, min(math.sqrt(2 * FORGOTTEN / (C * remaining)), OVERDAMPED / C))
+    forgotten = math.sqrt(2 * FORGOTTEN / (C * remaining))
+    return modes_below(arm, min(forgotten, OVERDAMPED / C))
 
 
 def most_modes(arm: Arm, chain: Chain) -> int:
-    """Largest number of modes of a loop: of a damped arm those that outlive a sample, and a few; at most 128."""
-    # of a whole loop: half a second of work
-    most_loop_modes = 128
-    # 4 modes of a whole loop decay within a sample
-    if arm.least_damping:
-        return min(most_loop_modes, 4 + count_lasting_modes(arm, chain))
-    return most_loop_modes
+    """Return the largest number of modes of a loop, at most 128: half a second of work.
+
+    Of a damped arm they are those that outlive a sample, and 4 that decay within it.
+    """
+    most = 128
+    return min(most, 4 + count_lasting_modes(arm, chain)) if arm.least_damping else most
 
 
 def whole_loop(case: Case) -> Sampled:
@@ -225,7 +224,7 @@ class Figure:
         return f"{self.value:.{self.digits}g}" if self.digits else "?"
 
     def as_text(self, _: int) -> str:
-        """The same, for tables; "≥ 20" of a lower bound, "not determined" without digits."""
+        """Return the same, for tables; "≥ 20" of a lower bound, "not determined" without digits."""
         shown = f"≥ {self.text}" if self.is_bound else self.text.replace("?", "not determined")
         return shown if self.modes is None else f"{shown} (first {self.modes} modes)"
 
@@ -234,7 +233,7 @@ class LowerBound(float):
     """A number of which no more than a lower bound is known: "≥ 0.2" in tables, a number in JSON."""
 
     def as_text(self, digits: int) -> str:
-        """The bound in some digits."""
+        """Return the bound in some digits."""
         return f"≥ {general(self, digits)}"
 
 
@@ -268,32 +267,36 @@ class Limit:
     @cached_property
     def figure(self) -> Figure:
         """The limit with its significant digits."""
-        if number := self._most(self._proof, 2):
+        number = self._most_digits(self._proof, 2)
+        if number:
             return Figure(self.value, number, self._proof(number), None)
-        return Figure(self.value, self._most(lambda each: self._turns(self.other, each), 1), None, self.modes)
+        number = self._most_digits(lambda each: self._band(self.other, each), 1)
+        return Figure(self.value, number, None, self.modes)
 
     @cached_property
     def _proof(self) -> Callable[[int], float]:
         """The band in which a number of digits is proven; 0: not proven."""
-        return cache(lambda number: self._turns(self.proven, number))
+        return cache(lambda number: self._band(self.proven, number))
 
-    def _most(self, band: Callable[[int], float], least: int) -> int:
+    def _most_digits(self, band: Callable[[int], float], least: int) -> int:
         """Return the most digits with a band, 0 for none; by bisection, as intervals of fewer contain the others."""
         if band(self.digits):
             return self.digits
         number = least - 1 + bisect_right(range(least, self.digits), False, key=lambda each: not band(each))
         return number if number >= least else 0
 
-    def _turns(self, test: Test, number: int) -> float:
+    def _band(self, test: Test, number: int) -> float:
         """Return the band in which the loop is stable at one end of the interval of these digits alone; 0: none."""
         if math.isinf(self.value):
             return 0.0
         rounded = float(f"{self.value:.{number}g}")
         half = 0.5 * 10.0 ** (math.floor(math.log10(abs(rounded))) - number + 1) if rounded else self.spare
-        inside, outside = (rounded - half, rounded + half) if self.below else (rounded + half, rounded - half)
-        stable, band = test(inside)
-        still, narrower = test(outside) if stable else (None, 0.0)
-        return min(band, narrower) if still is False else 0.0
+        outwards = half if self.below else -half
+        is_stable_inside, band = test(rounded - outwards)
+        if not is_stable_inside:
+            return 0.0
+        is_stable_outside, narrower = test(rounded + outwards)
+        return min(band, narrower) if is_stable_outside is False else 0.0
 
 
 def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[FigurePair]:
@@ -304,17 +307,17 @@ def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[FigurePai
     def proof(value: float) -> Proof:
         return _proof(band, loop.having(name, value))
 
-    def found(loop: Sampled) -> list[tuple[Limit, Limit]]:
-        other = _with_others(loop)
+    def search(loop: Sampled) -> list[tuple[Limit, Limit]]:
+        other = _comparison(loop)
         modes = loop.plant.count
 
-        def confirmed(value: float) -> Proof:
+        def confirmation(value: float) -> Proof:
             return other().having(name, value).is_stable, math.inf
 
         def edge(value: float, opposite: float, *, below: bool) -> Limit:
             # 1e-6 of the other edge of an interval: distance from 0 at which an edge at 0 is tested
             spare = 1e-6 * (abs(opposite) if opposite and math.isfinite(opposite) else 1.0)
-            return Limit(value, gain_digits, modes, proof, confirmed, below=below, spare=spare)
+            return Limit(value, gain_digits, modes, proof, confirmation, below=below, spare=spare)
 
         return [
             (edge(low, high, below=False), edge(high, low, below=True))
@@ -324,51 +327,52 @@ def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[FigurePai
     def is_sharp(windows: list[tuple[Limit, Limit]]) -> bool:
         return all(edge.is_sharp for pair in windows for edge in pair)
 
-    return [
-        (low.figure, high.figure) for low, high in _most_certain(loop, band, MOST_EDGE_MODES, found, is_sharp)
-    ]
+    edges = _most_certain(loop, band, MOST_EDGE_MODES, search, is_sharp)
+    return [(low.figure, high.figure) for low, high in edges]
 
 
 def _most_certain(
     loop: Sampled,
     band: Band | None,
     most: int,
-    found: Callable[[Sampled], Edge],
+    search: Callable[[Sampled], Edge],
     is_sharp: Callable[[Edge], bool],
 ) -> Edge:
-    """What is found with at most MOST_EDGE_MODES modes; in a certified band with twice as many until it `is_sharp`."""
+    """Return the edge with at most MOST_EDGE_MODES modes; in a certified band with twice as many until `is_sharp`."""
     loop = with_more_modes(loop, min(loop.plant.count, MOST_EDGE_MODES))
-    result = found(loop)
+    result = search(loop)
     count = loop.plant.count
     most = min(most, _most(loop)) if band is not None else 0
     while count < most and not is_sharp(result):
         count = min(2 * count, most)
-        result = found(with_more_modes(loop, count))
+        result = search(with_more_modes(loop, count))
     return result
 
 
-def _with_others(loop: Sampled) -> Callable[[], Sampled]:
-    """The loop with another number of modes to compare with, made at its first use."""
+def _comparison(loop: Sampled) -> Callable[[], Sampled]:
+    """Return the loop with another number of modes to compare with, made at its first use."""
     return cache(lambda: with_more_modes(loop, another(loop.plant.count, _most(loop))))
 
 
 def another(count: int, most: int) -> int:
-    """Another number of modes to compare with: twice as many, or half as many where these are too many."""
+    """Return another number of modes to compare with: twice as many, or half as many where these are too many."""
     return 2 * count if 2 * count <= most else max(1, count // 2)
 
 
 def _most(loop: Sampled) -> int:
-    """Largest number of modes of a search of edges: modes that decay within a sample add nothing."""
+    """Return the largest number of modes of a search of edges: modes that decay within a sample add nothing."""
     return min(MOST_EDGE_MODES, most_modes(loop.plant.arm, loop.chain))
 
 
 def _proof(band: Band | None, loop: Sampled) -> Proof:
-    """Whether a loop is stable with every mode of a band, by its discs on the circle."""
-    count = None if band is None else band.circle.count(loop.weights)
-    return None if count is None else count == 0, 0.0 if band is None else band.top
+    """Return whether a loop is stable with every mode of a band, by its discs on the circle."""
+    if band is None:
+        return None, 0.0
+    count = band.circle.count(loop.weights)
+    return None if count is None else count == 0, band.top
 
 
-def delay_limit(loop: Sampled, band: Band | None) -> Figure | Limit:
+def delay_limit(loop: Sampled, band: Band | None, digits: int = 4) -> Figure | Limit:
     """Return the delay margin [samples], with more and more modes until all its digits are certified.
 
     0 is as certain as the verdict that the loop is unstable.
@@ -381,24 +385,24 @@ def delay_limit(loop: Sampled, band: Band | None) -> Figure | Limit:
         later = band.loop.with_delay(now + more)
         return _proof(complete_band(later), later)
 
-    def found(loop: Sampled) -> Figure | Limit:
+    def search(loop: Sampled) -> Figure | Limit:
         margin = delay_margin(loop)
         modes = loop.plant.count
-        other = _with_others(loop)
+        other = _comparison(loop)
 
-        def holds(more: float) -> Proof:
+        def confirmation(more: float) -> Proof:
             return None if more < 0 else other().with_delay(now + more).is_stable, math.inf
 
-        if margin.samples == 0.0:
-            return Figure(0.0, OTHER_DIGITS, band.top if band else None, None if band else modes)
-        if margin.is_bound:
-            return Figure(margin.samples, OTHER_DIGITS, None, modes, is_bound=True)
-        return Limit(margin.samples, OTHER_DIGITS, modes, proof, holds, below=True)
+        if margin.samples == 0.0 and band:
+            return Figure(0.0, digits, band.top, None)
+        if margin.samples == 0.0 or margin.is_bound:
+            return Figure(margin.samples, digits, None, modes, is_bound=margin.is_bound)
+        return Limit(margin.samples, digits, modes, proof, confirmation, below=True)
 
-    return _most_certain(loop, band, MOST_EDGE_MODES // 2, found, lambda limit: limit.is_sharp)
+    return _most_certain(loop, band, MOST_EDGE_MODES // 2, search, lambda limit: limit.is_sharp)
 
 
-def damping_limit(loop: Sampled, count: int) -> Figure | Limit:
+def damping_limit(loop: Sampled, count: int, digits: int = 4) -> Figure | Limit:
     """Return the damping [s] from which on a loop is stable, by a search with `count` modes."""
     count = min(count, MOST_EDGE_MODES)
     bare = loop.on(loop.plant.arm.elastic, count)
@@ -406,13 +410,13 @@ def damping_limit(loop: Sampled, count: int) -> Figure | Limit:
     case = Case(bare.plant.arm, replace(loop.law, delay=0.0), loop.chain)
     C = damping_edge(bare)
     if C == 0.0:
-        return Figure(C, OTHER_DIGITS, None, count)
+        return Figure(C, digits, None, count)
 
     def proof(value: float) -> Proof:
         whole = whole_loop(case.on(case.arm.having(damping=value)))
         return _proof(complete_band(whole), whole)
 
-    def holds(value: float) -> Proof:
+    def confirmation(value: float) -> Proof:
         return log_radius_with(bare, value, another(count, MOST_EDGE_MODES)) < 0, math.inf
 
-    return Limit(C, OTHER_DIGITS, count, proof, holds, below=False)
+    return Limit(C, digits, count, proof, confirmation, below=False)

@@ -18,11 +18,6 @@ from tfarm.records import frozen
 
 # of the sum
 POINTS = 2**15
-# P is four times the times that are wanted; e^-36 of what follows is added
-# times the points of the sum: even times, 4 in a period of its last frequency, 8 of the largest not faded
-FINER = 4
-# of these times to either side, whose largest error is taken: the difference of two sums has zeros
-NEAR = 32
 
 
 @frozen
@@ -48,24 +43,28 @@ def invert_transform(transform: Callable[[Complex], Complex], end: float, growth
     # P is four times the times that are wanted; e^-36 of what follows is added
     periods = 4.0
     aliased = 36.0
+    # times the points of the sum: even times, 4 in a period of its last frequency, 8 of the largest not faded
+    finer = 4
+    # of these times to either side, whose largest error is taken: the difference of two sums has zeros
+    near = 32
     period = periods * end
     shift = growth + aliased / period
     n = np.arange(POINTS)
     values = transform(shift + 2j * np.pi * n / period)
     values[:, 0] /= 2
-    k = np.arange(FINER * POINTS)
+    k = np.arange(finer * POINTS)
     t = period / k.size * np.where(k < k.size / 2, k, k - k.size)
     rising = 2 / period * np.exp(shift * t)
 
-    def summed(last: int) -> Real:
+    def add_up(last: int) -> Real:
         fade = np.clip(2 - 2 * n / last, 0, 1)
         faded = values * np.sin(np.pi / 2 * fade) ** 2
         return np.asarray(rising * (np.fft.ifft(faded, k.size, axis=1) * k.size).real)
 
-    y = summed(POINTS)
-    shorter = summed(POINTS // 2)
+    y = add_up(POINTS)
+    shorter = add_up(POINTS // 2)
     error = np.maximum(abs(y - shorter), abs(np.roll(y[:, ::-1], 1, axis=1)))
-    error = maximum_filter1d(error, 2 * NEAR + 1, axis=1, mode="wrap")
+    error = maximum_filter1d(error, 2 * near + 1, axis=1, mode="wrap")
     error += MACHINE_EPS * rising * abs(values).sum(axis=1, keepdims=True)
     wanted = slice(k.size // int(periods) + 1)
     return Inversion(t[wanted], error[:, wanted], CubicSpline(t[wanted], y[:, wanted], axis=1))

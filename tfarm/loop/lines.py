@@ -24,7 +24,7 @@ from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.crossing import Crossing, Crossings, Grid, Line, Window, crossings
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import LoopParts
-from tfarm.loop.continuous import FAR_RIGHT, LONG_PATH, SLOWEST, ContinuousLoop, grid
+from tfarm.loop.continuous import FAR_RIGHT, SLOWEST, ContinuousLoop, grid, rig_parts
 from tfarm.loop.poles import box_of
 from tfarm.loop.stability import MARGIN_OF_ZERO
 from tfarm.response.signals import Signals
@@ -33,8 +33,6 @@ from tfarm.spectrum.table import first_frequency
 
 # how the name of a leading coefficient ends
 LEADING = ".den.0"
-# of the lowest frequency: where a real pole is searched on its way through 0
-NEAR_ORIGIN = (1e-6, 5e-7)
 
 
 def with_numbers(law: Law, values: Mapping[str, float]) -> Law:
@@ -58,7 +56,9 @@ class LawTerms:
     """
 
     def __init__(self, signals: Signals, law: Law, names: Iterable[str]) -> None:
-        self.signals, self.law, self.gains = signals, law, law.part_gains
+        self.signals = signals
+        self.law = law
+        self.gains = law.part_gains
         self.weights = np.ones(1 + len(law.parts))
         for name, (part, value) in self.gains.items():
             self.weights[1 + part] = value
@@ -73,27 +73,28 @@ class LawTerms:
                 self.others[name] = value, small, part, self.law.having(name, small).parts[part].block
 
     def of(self, s: Complex, rig: LoopParts) -> Complex:
-        """The terms (rows, ...) at places s, from the parts of the signals there."""
+        """Return the terms (rows, ...) at places s, from the parts of the signals there."""
         law = self.law
         shares, whole = law.shares(s)
         late = np.exp(-s * law.delay) * rig.numerators
         rows = [rig.drive * whole, *(shares * late).sum(axis=1)]
         D = np.tensordot(self.weights, rows, 1)
-        for _, _, part, block in self.others.values():
-            (signal,) = law.parts[part].signals
-            own = law.parts[part].block
+        for _, _, number, block in self.others.values():
+            part = law.parts[number]
+            (signal,) = part.signals
             fed_back = -law.sign * late[law.signals.index(signal)] * whole * block.numerators(s)[0]
-            rows.append(((D - rows[1 + part]) * block.denominator(s) + fed_back) / own.denominator(s))
+            without = D - rows[1 + number]
+            rows.append((without * block.denominator(s) + fed_back) / part.block.denominator(s))
         return np.array(rows)
 
     def at(self, s: Complex) -> Complex:
-        """The terms (rows, n) at places s (n,)."""
+        """Return the terms (rows, n) at places s (n,)."""
         return self.of(s, self.signals.parts(s))
 
     def on_axis(self, omega: Real) -> Complex:
-        """The terms at s = i omega (n,), of a rig without losses without rounding: even in s they are real there."""
+        """Return the terms at s = i omega (n,); without losses free of rounding, as terms even in s are real there."""
         s = 1j * omega
-        drive, numerators, scale = (self.signals.kept if s.size >= LONG_PATH else self.signals.parts)(s)
+        drive, numerators, scale = rig_parts(self.signals, s)
         if self.signals.system.is_real_on_axis:
             turn = np.exp(1j * scale.imag)
             odd = [[each.power % 2] for each in self.signals.outputs]
@@ -102,7 +103,7 @@ class LawTerms:
         return self.of(s, LoopParts(drive, numerators, scale))
 
     def line(self, name: str, low: float = -math.inf, high: float = math.inf) -> Line:
-        """The line of a number of the law."""
+        """Return the line of a number of the law."""
         weights = np.r_[self.weights, np.zeros(len(self.others))]
         part = self.part(name)
         # a factor on the law
@@ -115,7 +116,7 @@ class LawTerms:
         return Line.of(other, (weights - other) / (value - small), small, low, high)
 
     def having(self, name: str, value: float) -> LawTerms:
-        """The same with another value of the gain of a part."""
+        """Return the same with another value of the gain of a part."""
         other = copy(self)
         part = self.part(name)
         assert part is not None
@@ -124,7 +125,7 @@ class LawTerms:
         return other
 
     def part(self, name: str) -> int | None:
-        """The part whose weight is a number; None of any other."""
+        """Return the part whose weight is a number; None of any other."""
         plain = OUTPUT_OF.get(name, name).removesuffix(".gain")
         return next((self.gains[key][0] for key in (plain, f"{plain}.gain") if key in self.gains), None)
 
@@ -140,9 +141,9 @@ class Along(NamedTuple):
 def cross_axis(
     arm: Arm, terms: LawTerms, band: float, loops: Sequence[Along]
 ) -> Iterator[Callable[[], Crossings]]:
-    """Return for each line what makes its crossings of the axis, between its limits.
+    """Yield for each line a function that returns its crossings of the axis, between its limits.
 
-    It raises ConvergenceError where poles meet at s = 0 that cannot be counted.
+    That raises ConvergenceError where poles meet at s = 0 that cannot be counted.
     """
     # of w1: where the order of a zero at s = 0 is read off
     order_read_at = (2e-3, 1e-3)
@@ -150,17 +151,23 @@ def cross_axis(
     with_dips = bool(arm.least_damping)
     curve = Grid(np.asarray(grid(arm, band)), terms.on_axis)
     found = crossings(curve, [each.line for each in loops], with_dips=with_dips)
-    s = np.r_[
-        curve.places[0] * np.array(NEAR_ORIGIN), first_frequency(arm) * np.array([*order_read_at, *FAR_RIGHT])
-    ]
-    rows = terms.at(s + 0j)
+    others = first_frequency(arm) * np.array([*order_read_at, *FAR_RIGHT])
+    rows = terms.at(np.r_[near_origin(curve.places[0]), others] + 0j)
     for along, pairs in zip(loops, found, strict=True):
         line = along.line
         yield partial(_with_real_poles, along, pairs, line.others @ rows, line.alone @ rows, band)
 
 
+def near_origin(lowest: float) -> Real:
+    """Return two s where a real pole is searched on its way through 0, the second half the first.
+
+    `lowest` is the lowest frequency of a grid [rad/s].
+    """
+    return lowest * np.array([1e-6, 5e-7])
+
+
 def _with_real_poles(along: Along, found: list[Crossing], N: Complex, P: Complex, band: float) -> Crossings:
-    """The crossings of pairs along a line, those of real poles at s = 0 and infinity added, from N and P there.
+    """Return the crossings of pairs along a line, and those of real poles at s = 0 and infinity, from N and P there.
 
     Poles are counted on either side of a value at which two of them meet at s = 0.  Where the leading coefficient of a
     denominator changes its sign, a real pole passes through infinity.
@@ -173,13 +180,14 @@ def _with_real_poles(along: Along, found: list[Crossing], N: Complex, P: Complex
         # ratio of values at the first and the second: 2 of a simple zero, 4 of a double one
         is_single = zero * part < 3.0 * half * whole
         found.append(rest if is_single else rest._replace(change=_change_at(along, rest.t, found, band)))
-    if 0.0 in critical(along.name, limits)[1:-1] and (change := through_infinity(N[4:], P[4:])):
+    change = through_infinity(N[4:], P[4:])
+    if change and 0.0 in critical(along.name, limits)[1:-1]:
         found.append(Crossing(0.0, math.inf, change))
     return Crossings.of(each._replace(t=round_on_line(each.t, limits)) for each in found)
 
 
 def round_on_line(t: float, limits: Window) -> float:
-    """A number along a line; one that is 0 but for the rounding of its range is 0."""
+    """Return a number along a line; one that is 0 but for the rounding of its range is 0."""
     return 0.0 if abs(t) <= 4 * MACHINE_EPS * (limits[1] - limits[0]) else t
 
 
@@ -215,7 +223,10 @@ def _change_at(along: Along, at: float, others: list[Crossing], band: float) -> 
 
 
 def through_origin(N: Complex, P: Complex, limits: Window) -> Crossing | None:
-    """A real pole through s = 0, from N and P at two small real s, the second half the first; None without a limit."""
+    """Return the crossing of a real pole through s = 0, from N and P at two small real s; None without a limit.
+
+    The second s is half the first.
+    """
     if not P.all():
         return None
     far, near = -(N / P).real
@@ -226,7 +237,7 @@ def through_origin(N: Complex, P: Complex, limits: Window) -> Crossing | None:
 
 
 def through_infinity(N: Complex, P: Complex) -> int:
-    """The change of the count by a real pole through infinity, from N and P at three places as `FAR_RIGHT`; 0: none."""
+    """Return the change of the count by a real pole through infinity, from N and P at `FAR_RIGHT`; 0: none."""
     # a law of high order is beyond any number there
     with np.errstate(all="ignore"):
         before, last = np.diff(-(N / P).real)
@@ -261,7 +272,7 @@ def unstable_below(loop: ContinuousLoop, band: float) -> int:
 
 
 def critical(name: str, limits: Window) -> tuple[float, ...]:
-    """Values of a number at which the band must be sufficient: its limits, and 0 of a leading coefficient."""
+    """Return values of a number at which the band must be sufficient: its limits, and 0 of a leading coefficient."""
     low, high = limits
     if name.endswith(LEADING) and low < 0 < high:
         return (low, 0.0, high)
@@ -269,9 +280,8 @@ def critical(name: str, limits: Window) -> tuple[float, ...]:
 
 
 def static_edge(loop: ContinuousLoop, name: str, limits: Window) -> Crossing | None:
-    """The value of a number at which a real pole passes through s = 0, if there is one."""
-    near = SLOWEST * first_frequency(loop.arm) * np.array(NEAR_ORIGIN) + 0j
+    """Return the value of a number at which a real pole passes through s = 0, if there is one."""
     terms = LawTerms(loop.signals, loop.law, [name])
     line = terms.line(name)
-    rows = terms.at(near)
+    rows = terms.at(near_origin(SLOWEST * first_frequency(loop.arm)) + 0j)
     return through_origin(line.others @ rows, line.alone @ rows, limits)

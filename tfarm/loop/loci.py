@@ -17,7 +17,8 @@ from tfarm.arm.blocks import Matrices
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.case import Case
 from tfarm.errors import ConvergenceError
-from tfarm.loop.locus import ORIGIN, Locus, locus, origin_name
+from tfarm.loop.branches import ORIGIN, origin_name
+from tfarm.loop.locus import Locus, locus
 from tfarm.loop.varied import OF_THE_LAW, Title
 from tfarm.records import frozen
 from tfarm.reduced import modal_model
@@ -35,17 +36,6 @@ POLE_DIGITS = 10
 GAP_NOTE = (
     "largest distance of a branch from the reduced one, "
     "over |s| or the arm's first flexible frequency, the larger"
-)
-BEST = Quantity(
-    "first mode most damped",
-    key="first_mode_most_damped",
-    help="largest damping ratio of mode 1 along a gain",
-)
-BRANCHES_NOTE = (
-    "poles followed: those at s = 0, then one a mode with Im s > 0; its mirror image only where the two part on the "
-    "real axis. A crossing of a branch with omega > 0 is one of its mirror image too. A branch is null where it is not "
-    "followed: beyond -1/C, where real poles accumulate; outside the box of a law. Crossings of poles on no branch are "
-    "listed too (branch null)."
 )
 
 
@@ -77,7 +67,7 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
     Raises ConvergenceError if the model is beyond python-control.
     """
     arm = exact.arm
-    rigid = exact.arm.has_rigid_mode
+    rigid = arm.has_rigid_mode
     # by default ten modes at least, and two modes above the last branch
     order = order or max(20, 2 * (int(exact.mode.max()) + rigid + 2))
     count = order // 2 - rigid
@@ -95,46 +85,49 @@ def reduced_locus(exact: Locus, order: int | None = None) -> ReducedLocus:
     else:
         # 9 values at which an arm is reduced anew, where a parameter of it varies
         which = np.unique(np.linspace(0, exact.gain.size - 1, 9).round().astype(int))
-        arms = [exact.varied.at(float(value)).arm for value in exact.gain[which]]
-        none = np.zeros(len(FED_BACK))
-        closed = [_closed(each, np.array(exact.gains.row), count, none)[0][0] for each in arms]
-        poles = np.array([np.linalg.eigvals(A) for A in closed])
+        arms = [exact.varied.at(value).arm for value in exact.gain[which].tolist()]
+        models = [_closed_model(each, exact.gains, count, HubFeedback())[0] for each in arms]
+        poles = np.array([np.linalg.eigvals(A) for A, *_ in models])
     branches = exact.branches[:, which]
     paired = np.full(branches.shape, np.nan, complex)
     for n, (zeros, found) in enumerate(zip(branches.T, poles, strict=True)):
         _, chosen = linear_sum_assignment(np.nan_to_num(abs(zeros[:, None] - found)))
         paired[:, n] = np.where(np.isnan(zeros), np.nan, found[chosen])
     size = np.maximum(abs(branches), modes(arm, 1).natural_frequency[-1])
-    return ReducedLocus(
-        order, exact.gain[which], paired, np.fmax.reduce(abs(paired - branches) / size, axis=1)
-    )
+    gap = np.fmax.reduce(abs(paired - branches) / size, axis=1)
+    return ReducedLocus(order, exact.gain[which], paired, gap)
 
 
 def reduced_of(exact: Locus) -> ReducedLocus | None:
-    """The reduced locus of gains at the hub; None of another law or number."""
+    """Return the reduced locus of gains at the hub; None of another law or number."""
     return None if exact.in_box else reduced_locus(exact)
 
 
 def open_loop(case: Case, vary: str, count: int) -> control.StateSpace:
-    """The loop function that the varied gain multiplies, all other gains closed: state space of a modal model."""
+    """Return the loop function that the varied gain multiplies, all other gains closed, of a modal model."""
     import control
 
     law = case.gains
     assert law is not None
-    moving = np.array(law.row) if vary == "all" else np.array(HubFeedback().having(vary, 1.0).row)
-    fixed = np.zeros(moving.size) if vary == "all" else np.array(law.having(vary, 0.0).row)
-    (A, B, C, D), row = _closed(case.arm, fixed, count, moving)
+    if vary == "all":
+        moving = law
+        fixed = HubFeedback()
+    else:
+        moving = HubFeedback().having(vary, 1.0)
+        fixed = law.having(vary, 0.0)
+    (A, B, C, D), row = _closed_model(case.arm, fixed, count, moving)
     return control.StateSpace(A, B, row @ C, row @ D)
 
 
-def _closed(arm: Arm, fixed: Real, count: int, moving: Real) -> tuple[Matrices, Real]:
-    """The model of the outputs of either row of gains, closed by the fixed one; the other row on its outputs."""
-    used = (fixed != 0) | (moving != 0)
+def _closed_model(arm: Arm, fixed: HubFeedback, count: int, moving: HubFeedback) -> tuple[Matrices, Real]:
+    """Return the model of the outputs of either law, closed by the fixed one, and the other's row on its outputs."""
+    rows = np.array([fixed.row, moving.row])
+    used = np.asarray(rows.any(axis=0))
     used[FED_BACK.index("hub_rate")] |= not used.any()
     # or its pole at 0 is not a state
     used[FED_BACK.index("hub_angle")] |= bool(arm.rate_loss) and arm.has_rigid_mode
-    model = modal_model(arm, [name for name, is_used in zip(FED_BACK, used, strict=True) if is_used], count)
-    return model.closed(fixed[used]), moving[None, used]
+    model = modal_model(arm, np.array(FED_BACK)[used].tolist(), count)
+    return model.closed(rows[0, used]), rows[1:, used]
 
 
 @frozen
@@ -161,32 +154,32 @@ def most_damped(found: Locus) -> MostDamped | None:
     rows = rows[~np.isnan(rows).any(axis=1)]
     if found.vary not in NAMES or not rows.size:
         return None
-    way = int(np.sign(found.gain[-1] - found.gain[0]))
-    ratios = damping_ratios(rows[0])
+    first = rows[0]
+    ratios = damping_ratios(first)
     at = int(np.argmax(ratios))
     best = (float(found.gain[at]), float(ratios[at]))
+    way = int(np.sign(found.gain[-1] - found.gain[0]))
     near = slice(at - 1, at + 2)
     gain = found.gain[near][::way]
-    branch = rows[0][near][::way]
+    branch = first[near][::way]
     if 0 < at < ratios.size - 1 and (branch.imag > 0).all():
 
-        def ratio(value: float) -> float:
-            return -float(
-                damping_ratios(interpolate_roots(found.varied, gain, branch[:, None], np.array([value])))[
-                    0, 0
-                ]
-            )
+        def negative_ratio(value: float) -> float:
+            pole = interpolate_roots(found.varied, gain, branch[:, None], np.array([value]))
+            return -damping_ratios(pole).item()
 
         # 1e-7 of the gain: a damping ratio, flat there, is known to 1e-14 of its curvature
-        ends = (float(gain[0]), float(gain[2]))
-        known = float(1e-7 * abs(gain[1]))
-        least = minimize_scalar(ratio, bounds=ends, method="bounded", options={"xatol": known})
-        best = float(least.x), -float(least.fun)
-    return MostDamped(*best, bool((rows[0][at:].imag > 0).all()), found.varied.title)
+        low, middle, high = gain.tolist()
+        known = 1e-7 * abs(middle)
+        least = minimize_scalar(
+            negative_ratio, bounds=(low, high), method="bounded", options={"xatol": known}
+        )
+        best = (float(least.x), -float(least.fun))
+    return MostDamped(*best, bool((first[at:].imag > 0).all()), found.varied.title)
 
 
 def damping_ratios(s: Complex) -> Real:
-    """-Re s/|s| of oscillating poles; -inf of real ones."""
+    """Return -Re s/|s| of oscillating poles; -inf of real ones."""
     return np.where(s.imag > 0, -s.real / np.maximum(abs(s), LEAST_SIZE), -np.inf)
 
 
@@ -220,28 +213,46 @@ class Loci:
     reduced: Annotated[ReducedLocus | Any, Quantity(flat=True)]
 
     @property
-    def rows(self) -> Annotated[list[Branch], Quantity("branches", key="branch_list", help=BRANCHES_NOTE)]:
+    def rows(
+        self,
+    ) -> Annotated[
+        list[Branch],
+        Quantity(
+            "branches",
+            key="branch_list",
+            help="poles followed: those at s = 0, then one a mode with Im s > 0; its mirror image only where the two "
+            "part on the real axis. A crossing of a branch with omega > 0 is one of its mirror image too. A branch is "
+            "null where it is not followed: beyond -1/C, where real poles accumulate; outside the box of a law. "
+            "Crossings of poles on no branch are listed too (branch null).",
+        ),
+    ]:
         """One row for each branch."""
         exact = self.exact
-        ends = dict(self.exact.ends)
-        (_, unit) = self.exact.varied.title
-        branches = exact.branches.tolist()
-        modes = exact.mode.tolist()
-        gaps = [None] * len(branches) if self.reduced is None else self.reduced.gap.tolist()
-        values = zip(("first", "last"), exact.gain[[0, -1]].tolist(), strict=True)
-        titles = {
-            end: (f"pole at {exact.vary} = {value:.6g}{f' {unit}' if unit else ''}", "1/s")
-            for end, value in values
-        }
+        ends = dict(exact.ends)
+        names = map(origin_name, exact.origin.tolist())
+        gaps = [None] * len(exact.branches) if self.reduced is None else self.reduced.gap.tolist()
+        unit = f" {self.unit}" if self.unit else ""
+        titles = {}
+        for end, value in zip(("first", "last"), exact.gain[[0, -1]].tolist(), strict=True):
+            titles[end] = (f"pole at {exact.vary} = {value:.6g}{unit}", "1/s")
+        poles = exact.branches[:, [0, -1]].tolist()
+        columns = zip(names, exact.mode.tolist(), poles, gaps, strict=True)
         return [
-            Branch(
-                n, origin_name(int(exact.origin[n])), modes[n], row[0], row[-1], gaps[n], ends.get(n), titles
-            )
-            for n, row in enumerate(branches)
+            Branch(n, name, mode, first, last, gap, ends.get(n), titles)
+            for n, (name, mode, (first, last), gap) in enumerate(columns)
         ]
 
     @property
-    def best(self) -> Annotated[MostDamped | None, BEST]:
+    def best(
+        self,
+    ) -> Annotated[
+        MostDamped | None,
+        Quantity(
+            "first mode most damped",
+            key="first_mode_most_damped",
+            help="largest damping ratio of mode 1 along a gain",
+        ),
+    ]:
         """The gain at which the first mode has its largest damping ratio."""
         return most_damped(self.exact)
 
@@ -256,15 +267,15 @@ class Loci:
         return self.exact.varied.title[1]
 
 
-def held_branches(branches: Complex) -> Complex:
-    """Branches rounded to the digits that are the same on every processor, relative to |s|: a small Re s is kept."""
+def round_branches(branches: Complex) -> Complex:
+    """Round branches to the digits that are the same on every processor, relative to |s|: a small Re s is kept."""
     size = np.maximum(abs(branches), np.finfo(float).tiny)
     unit = 10.0 ** (np.floor(np.log10(size)) + 1 - POLE_DIGITS)
     return np.round(branches.real / unit) * unit + 1j * (np.round(branches.imag / unit) * unit)
 
 
 def loci(case: Case, vary: str, start: float, stop: float) -> Loci:
-    """Return both loci of one gain.  Raises what `locus` and `reduced_locus` raise."""
+    """Return both loci of one gain.  Raises as `locus` and `reduced_locus` do."""
     locus_branches = 7
     exact = locus(case.arm, case.law, vary, start, stop, LOCUS_POINTS, locus_branches)
     return Loci(exact, reduced_locus(exact))

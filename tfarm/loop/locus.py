@@ -2,7 +2,7 @@
 
 At a few values the winding number counts the poles of a box: there the list is complete.  In between each pole is
 followed (`tfarm.spectrum.following`), vectorised over values and poles.  Branches are named after the modes of the rig
-without feedback: a factor on the law grows from 0 to 1 at the first value, and each pole is followed on that way.
+without feedback (`tfarm.loop.branches`).
 
 Crossings are solved for gain and frequency together, not interpolated.  Along a number of the law in which D is linear
 D-decomposition has every one (`tfarm.crossing`).  Each belongs to the branch that changes sides there, or to a pole on
@@ -28,7 +28,7 @@ from tfarm.case import Case, OfCase
 from tfarm.crossing import Crossing
 from tfarm.crossing.turning import loose
 from tfarm.errors import ConvergenceError, must_be_known, require
-from tfarm.loop.continuous import ContinuousLoop
+from tfarm.loop.branches import ORIGIN, at_origin, follow_poles, origin_name
 from tfarm.loop.lines import line_crossings
 from tfarm.loop.varied import ARM_PARAMETERS, OF_THE_LAW, Title, Varied
 from tfarm.loop.windows import without_losses
@@ -36,32 +36,11 @@ from tfarm.records import frozen
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Quantity
-from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.box import Box
-from tfarm.spectrum.following import assign_roots, follow, interpolate_roots
+from tfarm.spectrum.following import interpolate_roots
 
 # values, those between that make it round among them
 MOST_LOCUS_POINTS = 100_000
-# of a locus, in its finding
-CROSSINGS_SHOWN = 3
-# origin of a branch of no flexible mode
-RIGID = 0
-CONTROLLER = -1
-OTHER = -2
-ORIGINS = {RIGID: "rigid body", CONTROLLER: "controller", OTHER: "other"}
-
-CROSSINGS = Quantity(
-    "crossings of the imaginary axis", help="solved for, not interpolated; in the order of the range"
-)
-ORIGIN = Quantity(
-    "origin",
-    help="open-loop pole that the branch continues from; other: the motor's circuit, a delay, a fast real pole",
-)
-
-
-def origin_name(origin: int) -> str:
-    """The flexible mode of that number, or another origin of a branch."""
-    return ORIGINS.get(origin, f"mode {origin}")
 
 
 @frozen
@@ -70,8 +49,8 @@ class Locus(OfCase):
 
     `gain` (n,) are the values of what `vary` names: a number of the law, "all" (a factor on it) or of the arm;
     `branches` (b, n) [1/s] are poles followed: those at s = 0, then in the order of the modes they continue from
-    (`origin` (b,): its number, or one of `ORIGINS`).  The mirror image of a branch is left out, unless the two meet on
-    the real axis and part there: then it is a branch of its own, with Im s < 0 where they are a pair.  A branch is NaN
+    (`origin` (b,): its number, or an `Origin`).  The mirror image of a branch is left out, unless the two meet on the
+    real axis and part there: then it is a branch of its own, with Im s < 0 where they are a pair.  A branch is NaN
     where it is not followed (`ends`).  `box` holds no other pole at its nodes.
     `arm` is that at the first value where a number of it varies.
     `followed` are all poles but those at 0 all the way, mirror images too, `listed` the numbers of those in
@@ -91,7 +70,13 @@ class Locus(OfCase):
     box: Annotated[
         Box, Quantity("box: Re s from, to, Im s from, to", help="poles are complete in it at a few values")
     ]
-    crossings: Annotated[tuple[BranchCrossing, ...], CROSSINGS]
+    crossings: Annotated[
+        tuple[BranchCrossing, ...],
+        Quantity(
+            "crossings of the imaginary axis",
+            help="solved for, not interpolated; in the order of the range",
+        ),
+    ]
     followed: Complex = field(repr=False, compare=False)
     listed: Whole = field(repr=False, compare=False)
     in_box: bool = False
@@ -103,13 +88,14 @@ class Locus(OfCase):
 
     @property
     def finding(self) -> str:
-        """The first `CROSSINGS_SHOWN` crossings of the imaginary axis."""
+        """The first three crossings of the imaginary axis."""
         if not self.crossings:
             return "no branch crosses the imaginary axis"
-        shown = self.crossings[:CROSSINGS_SHOWN]
-        more = len(self.crossings) - CROSSINGS_SHOWN
+        shown = self.crossings[:3]
         first = ", ".join(f"{each.direction} at {self.vary} = {each.gain:.6g}" for each in shown)
-        return f"a pole becomes {first}{f' and {more} more' if more > 0 else ''}"
+        more = len(self.crossings) - len(shown)
+        others = f" and {more} more" if more else ""
+        return f"a pole becomes {first}{others}"
 
     @property
     def controller(self) -> Annotated[ControllerSignals, Quantity(flat=True)]:
@@ -190,7 +176,8 @@ def locus(
     is_shown = family.box.holds(rows) if in_box else ~np.isnan(rows)
     # others are mirror images throughout
     is_upper = (rows.imag >= 0).any(axis=1)
-    listed = np.flatnonzero(is_shown.any(axis=1) & is_upper)[: None if in_box else branches - family.pinned]
+    most = None if in_box else branches - family.pinned
+    listed = np.flatnonzero(is_shown.any(axis=1) & is_upper)[:most]
     pinned = min(family.pinned, branches)
     found = branches_in_box(rows, listed, pinned, family.box if in_box else None)
     if len(found) < branches and not in_box:
@@ -206,102 +193,11 @@ def locus(
 
 
 def branches_in_box(rows: Complex, listed: Whole, pinned: int, box: Box | None) -> Complex:
-    """The branches listed after the poles pinned at 0, NaN outside the box where there is one."""
+    """Return the branches listed after the poles pinned at 0, NaN outside the box where there is one."""
     found: Complex = np.concatenate([np.zeros((pinned, rows.shape[1]), complex), rows[listed]])
     # no -0
     found += 0.0
     return found if box is None else np.where(box.holds(found), found, np.nan)
-
-
-def follow_poles(family: Varied, gain: Real, modes: int) -> tuple[Complex, Whole]:
-    """All poles (b, n) but those at 0 at every value, mirror images included, and the origin of each."""
-    # 2 flexible modes are followed beyond the box, whose poles may come into it
-    row, origin = continue_from_rig(family, modes + 2)
-    row = np.r_[row, missing_poles(family, family.start, row)]
-    rows = row[:, None]
-    low = 0
-    # 3 values after the first at which the poles of the box are counted
-    nodes = np.unique(np.linspace(0, gain.size - 1, 3 + 1).round().astype(int)).tolist()[1:]
-    while nodes:
-        high = nodes[0]
-        try:
-            part = follow(family, gain[low : high + 1], rows[:, -1])
-        except ConvergenceError:
-            # of a pole that came into the box, and is next to one of these
-            if high - low == 1:
-                raise
-            nodes.insert(0, (low + high) // 2)
-            continue
-        new = missing_poles(family, float(gain[high]), part[-1])
-        if new.size:
-            back = follow(family, gain[low : high + 1][::-1], np.r_[part[-1], new])
-            part = np.hstack([part, back[::-1, part.shape[1] :]])
-            rows = np.vstack([rows, np.full((new.size, rows.shape[1]), np.nan)])
-        rows = np.hstack([rows, part[1:].T])
-        low = nodes.pop(0)
-    return rows, np.r_[origin, np.full(len(rows) - origin.size, OTHER)]
-
-
-def missing_poles(family: Varied, value: float, row: Complex) -> Complex:
-    """The poles of the box at a value that are not among these (b,): none where their number is that of the box."""
-    inside = row[family.box.holds(row) & (row != 0)]
-    try:
-        count = family.count(value)
-    except ConvergenceError:
-        # a pole on the edge of the box: there it comes or goes
-        return row[:0]
-    if count < inside.size:
-        text = f"two branches cannot be distinguished at {family.vary} = {value:.10g}"
-        raise ConvergenceError(text, value, inside.size)
-    if count == inside.size:
-        return row[:0]
-    every = family.complete(value, row)
-    away = abs(every[:, None] - row[~np.isnan(row)]).min(axis=1, initial=math.inf)
-    # within 1e-6 of its size a pole of two searches is one
-    return every[away > 1e-6 * abs(every)]
-
-
-def continue_from_rig(family: Varied, number: int) -> tuple[Complex, Whole]:
-    """Poles at the first value (b,) that continue from the open rig's, and their origins; without those pinned at 0.
-
-    In the order of the modes, `number` flexible ones; poles of a law come last.
-    """
-    loop = family.first
-    grown = Varied(loop.case, "gain", 0.0, 1.0, family.box)
-    row, origin = open_poles(loop.arm, number)
-    own = loop.law.poles[loop.law.poles != 0]
-    resting = at_origin(grown.at(0.0))
-    row = np.r_[np.zeros(resting.size - grown.pinned, complex), row, own]
-    origin = np.r_[resting[grown.pinned :], origin, np.full(own.size, CONTROLLER)]
-    if loop.feeds_back:
-        try:
-            row = follow(grown, np.array([0.0, 1.0]), row)[1]
-        except ConvergenceError:
-            # of poles that come in from afar, as under a delay
-            row = assign_roots(grown, 1.0, row)
-    # at 0 at the first value alone
-    of_first = resting[family.pinned : grown.pinned]
-    row = np.r_[np.zeros(of_first.size, complex), row]
-    origin = np.r_[of_first, origin]
-    return row[~np.isnan(row)], origin[~np.isnan(row)]
-
-
-def at_origin(loop: ContinuousLoop) -> Whole:
-    """Origins of the poles at s = 0 of a loop: those of the rig first."""
-    return np.where(np.arange(loop.zeros_at_origin) < loop.k.at_rest, RIGID, CONTROLLER)
-
-
-def open_poles(arm: Arm, number: int) -> tuple[Complex, Whole]:
-    """Poles of the rig without feedback, both of each pair, and their origins: of at least `number` flexible modes."""
-    found = damped_modes(modes(arm, number))
-    rigid = found.eigenvalues[found.index == 0].ravel()
-    pairs = found.eigenvalues[found.index > 0].ravel()
-    others = [*found.others, *found.unassigned_pairs.ravel()]
-    row = np.array([*rigid, *others, *pairs], complex)
-    origin = np.repeat([RIGID, OTHER], [len(rigid), len(others)])
-    origin = np.r_[origin, np.repeat(found.index[found.index > 0], 2)]
-    alive = np.isfinite(row) & (row != 0)
-    return row[alive], origin[alive]
 
 
 def refine_branches(found: Locus) -> Locus:
@@ -318,8 +214,9 @@ def refine_branches(found: Locus) -> Locus:
     box = found.box
     # rounds of halving at most: where two branches meet their distance goes with the root of that of the gain
     for _ in range(24):
-        pictures = np.array([*map(frame, branches)]), frame(branches), view(branches, found.origin)
-        sizes = [np.diff(np.atleast_2d(each))[:, ::2, None] for each in pictures]
+        own = np.array([*map(frame, branches)])
+        common = np.array([frame(branches), view(branches, found.origin)])
+        sizes = [np.diff(each)[:, ::2, None] for each in (own, common[:1], common[1:])]
         is_loose = np.any([loose(branches, *each.swapaxes(0, 1)) for each in sizes], axis=0)
         more = (gain[:-1] + gain[1:])[is_loose] / 2
         if not more.size or more.size + gain.size > MOST_LOCUS_POINTS:
@@ -333,7 +230,7 @@ def refine_branches(found: Locus) -> Locus:
 
 
 def frame(branches: Complex) -> tuple[float, float, float, float]:
-    """Left, right, low and high [1/s] of the picture of all these branches, with the imaginary axis."""
+    """Return left, right, low and high [1/s] of the picture of all these branches, with the imaginary axis."""
     points = branches[~np.isnan(branches)]
     if not points.size:
         return 0.0, 1.0, 0.0, 1.0
@@ -341,8 +238,7 @@ def frame(branches: Complex) -> tuple[float, float, float, float]:
     right = float(points.real.max(initial=0.0))
     low = float(points.imag.min())
     high = float(points.imag.max())
-    # less than 1e-12 of the size of its poles is rounding of a constant pole
-    # where no pole moves from 0
+    # less than 1e-12 of the size of its poles is rounding of a constant pole; 1 where no pole moves from 0
     wide = max(right - left, 1e-12 * float(abs(points).max())) or 1.0
     # where none of them oscillates
     tall = max(high - low, 1e-9 * high) or wide
@@ -350,12 +246,12 @@ def frame(branches: Complex) -> tuple[float, float, float, float]:
 
 
 def view(branches: Complex, origin: Whole) -> tuple[float, float, float, float]:
-    """The same of a picture scaled to the modes, Im s >= 0: not to far real poles, nor to poles of other origins."""
-    swinging = branches[origin > 0]
-    swinging = swinging[swinging.imag > 0]
-    if not swinging.size:
+    """Return the same of a picture scaled to the modes, Im s >= 0, not to far real poles or those of other origins."""
+    of_modes = branches[origin > 0]
+    oscillating = of_modes[of_modes.imag > 0]
+    if not oscillating.size:
         return frame(branches)
-    left, right, _, high = frame(swinging)
+    left, right, _, high = frame(oscillating)
     return max(left, -high), min(right, high), 0.0, high
 
 
@@ -405,29 +301,26 @@ def branch_crossings(
     changes = _changes(branches)
     is_damped = not family.is_reactive
     known: list[Crossing] = []
-    if (changes or is_damped) and not (family.is_of_arm or family.vary == "delay"):
-        loop = family.first.under(family.full)
-        name = "gain" if family.vary == "all" else family.vary
+    if changes or is_damped:
         # between two values a branch may be higher
         band = max(top, 1.01 * float(np.nanmax(branches.imag, initial=0.0)))
         try:
-            known = list(without_losses(loop, name, line_crossings(loop, name, low, high, band)))
+            known = linear_crossings(family, low, high, band)
         except ConvergenceError:
             # two poles meet at s = 0, and those of modes that rest are on the axis throughout
             if is_damped:
                 raise
 
     def crossing(at: float, omega: float, change: float, branch: int | None = None) -> BranchCrossing:
-        of = None if branch is None else origin_name(int(origin[branch]))
-        return BranchCrossing(
-            at, omega, branch, "unstable" if way * change > 0 else "stable", of, family.title
-        )
+        name = None if branch is None else origin_name(int(origin[branch]))
+        direction = "unstable" if way * change > 0 else "stable"
+        return BranchCrossing(at, omega, branch, direction, name, family.title)
 
     found = []
     for number, *step in changes:
         step.sort(key=lambda n: gain[n])
         points = branches[number, step]
-        at, omega = _crossed(family, gain[step], points, known, top)
+        at, omega = _crossing_between(family, gain[step], points, known, top)
         found.append(crossing(at, omega, points[1].real - points[0].real, number))
     # 1e-9 of the range: a crossing so near to an end is at the end, and not between
     seen = {(own.gain, own.omega) for own in found}
@@ -439,8 +332,17 @@ def branch_crossings(
     return tuple(sorted(found, key=lambda own: (way * own.gain, own.omega)))
 
 
+def linear_crossings(family: Varied, low: float, high: float, band: float) -> list[Crossing]:
+    """Return the crossings up to a band [rad/s] along a number in which D is linear; none along another."""
+    if family.is_of_arm or family.vary == "delay":
+        return []
+    loop = family.first.under(family.full)
+    name = "gain" if family.vary == "all" else family.vary
+    return list(without_losses(loop, name, line_crossings(loop, name, low, high, band)))
+
+
 def _changes(branches: Complex) -> list[tuple[int, int, int]]:
-    """Each branch that changes sides, with the numbers of its last value before and the first after.
+    """Return each branch that changes sides, with the numbers of its last value before and the first after.
 
     Points on the axis are left out.  A change too is where a point at i w becomes a real one off the axis.  Mirror
     images are not listed.
@@ -456,19 +358,16 @@ def _changes(branches: Complex) -> list[tuple[int, int, int]]:
     for number, (sides, poles) in enumerate(zip(side, branches, strict=True)):
         pairs = {(a, b) for a, b in pairwise(np.flatnonzero(sides).tolist()) if sides[a] != sides[b]}
         pairs |= {(n, n + 1) for n in np.flatnonzero(leaves[number]).tolist()}
-        is_upper = poles.imag >= 0
-        found += [
-            (number, a, b)
-            for a, b in sorted(pairs)
-            if is_upper[[a, b]].all() and np.isfinite(poles[a:b]).all()
-        ]
+        for a, b in sorted(pairs):
+            if (poles[[a, b]].imag >= 0).all() and np.isfinite(poles[a:b]).all():
+                found.append((number, a, b))
     return found
 
 
-def _crossed(
+def _crossing_between(
     family: Varied, ends: Real, points: Complex, known: Sequence[Crossing], top: float
 ) -> tuple[float, float]:
-    """The value between two (ascending) at which a branch is on the axis, and the frequency there."""
+    """Return the value between two (ascending) at which a branch is on the axis, and the frequency there."""
     (low, high) = ends.tolist()
     (slow, fast) = sorted(abs(points.imag).tolist())
     # 1e-3 of the highest frequency: largest distance of a crossing from where the points of its branch are

@@ -21,8 +21,6 @@ from tfarm.loop.loop import Loop
 from tfarm.records import frozen
 from tfarm.schema import At, Quantity
 
-# of the value at each crossover, at most: more than any table rounds to
-CROSSOVER_DIGITS = 12
 DELAY_MARGIN = Quantity("delay margin", "s", help="smallest further loop delay that destabilises the loop")
 DISK_MARGIN = Quantity("disk margin", help="gain and phase together: factors (2 + d)/(2 - d), |d| < margin")
 PEAK_SENSITIVITY = Quantity("peak sensitivity Ms", key="peak_sensitivity", help="largest |1/(1 + L)|")
@@ -169,7 +167,7 @@ def margins_along(
     apart = _spread(lambda w: loop.loop_function(1j * w), crossed)
     minus = -loop.loop_function(1j * crossed)
     # 0 where L = -1
-    angle = round_near_poles(np.degrees(np.angle(minus)), np.degrees(apart), CROSSOVER_DIGITS)
+    angle = round_crossovers(np.degrees(np.angle(minus)), np.degrees(apart))
     delay = round_near_poles(np.radians(np.mod(angle, 360)) / crossed, apart / crossed)
     lag = angle > 0
     lead = angle < 0
@@ -192,6 +190,11 @@ def margins_along(
     return LoopMargins(band, gain, **values, at=places, gain_crossovers=by_gain, phase_crossovers=by_phase)
 
 
+def round_crossovers(values: Real, spread: Real) -> Real:
+    """Round values (n,) at crossovers: at most to 12 digits, more than any table rounds to."""
+    return round_near_poles(values, spread, 12)
+
+
 def round_near_poles(values: Real, spread: Real, most: int = 9) -> Real:
     """Round values (n,) to the digits that are significant next to poles of L, where L is rounded.
 
@@ -204,7 +207,7 @@ def round_near_poles(values: Real, spread: Real, most: int = 9) -> Real:
 
 
 def _spread(f: Callable[[Real], Real | Complex], omega: Real) -> Real:
-    """Largest change of f at frequencies (n,) among the doubles next to each: its rounding error."""
+    """Return the largest change of f at frequencies (n,) among the doubles next to each: its rounding error."""
     if not omega.size:
         return np.empty(0)
     next_doubles = 2.0**-52 * np.arange(-16, 17, 4)
@@ -213,7 +216,7 @@ def _spread(f: Callable[[Real], Real | Complex], omega: Real) -> Real:
 
 
 def _distance(loop: Loop, of_1: float, of_L: float) -> Callable[[Real], Real]:
-    """|1 + L| over |of_1 + of_L L| at i omega: 1/|S|, 1/|T|, or a disk margin at one frequency."""
+    """Return |1 + L| over |of_1 + of_L L| at i omega: 1/|S|, 1/|T|, or a disk margin at one frequency."""
 
     def at(omega: Real) -> Real:
         drive, fed_back = loop.parts(1j * omega)
@@ -223,7 +226,7 @@ def _distance(loop: Loop, of_1: float, of_L: float) -> Callable[[Real], Real]:
 
 
 def phase_crossovers(loop: Loop, omega: Real) -> tuple[PhaseCrossover, ...]:
-    """Frequencies [rad/s] with L real and below 0, and the factor -1/L; at rest too where L is finite there.
+    """Return the frequencies [rad/s] with L real and below 0, and the factor -1/L; at rest too where L is finite there.
 
     Where L changes the side of the real axis at a pole or zero of its own, its denominator or numerator turns and not
     L.  Both sides are compared as near as rounding allows: next to a narrow resonance L is so close to the axis that
@@ -232,7 +235,7 @@ def phase_crossovers(loop: Loop, omega: Real) -> tuple[PhaseCrossover, ...]:
     # a factor on L so small belongs to a pole of L on the axis, where L changes its sign through infinity
     at_pole = 1e-9
 
-    def turned(w: Real) -> Real:
+    def side(w: Real) -> Real:
         drive, fed_back = loop.parts(1j * w)
         return np.asarray((drive * fed_back.conj()).imag)
 
@@ -243,14 +246,14 @@ def phase_crossovers(loop: Loop, omega: Real) -> tuple[PhaseCrossover, ...]:
     sides = place * (1 + np.multiply.outer([-1.0, 1.0], farther)[..., None])
     own = np.array(loop.parts(1j * sides))
     h = (own[0] * own[1].conj()).imag
-    decided = (h.prod(axis=0) < 0) & (abs(h).min(axis=0) > 4.0 * _spread(turned, place))
+    decided = (h.prod(axis=0) < 0) & (abs(h).min(axis=0) > 4.0 * _spread(side, place))
     opposite = ((own[:, 0] * own[:, 1].conj()).real < 0).any(axis=0)
     nearest = decided.argmax(axis=0)[None]
     turns = np.take_along_axis(opposite, nearest, 0)[0] | ~decided.any(axis=0)
     crosses = (factor > at_pole) & (factor < 1 / at_pole) & ~turns
     place = place[crosses]
     factor = factor[crosses]
-    factor = round_near_poles(factor, _spread(lambda w: _factor(loop, w), place), CROSSOVER_DIGITS)
+    factor = round_crossovers(factor, _spread(lambda w: _factor(loop, w), place))
     found = list(map(PhaseCrossover, place.tolist(), factor.tolist()))
     low, lower = _factor(loop, omega[0] * np.array([1.0, 0.5]))
     # at rest -1/L is real, and does not change further down
@@ -260,13 +263,13 @@ def phase_crossovers(loop: Loop, omega: Real) -> tuple[PhaseCrossover, ...]:
 
 
 def _factor(loop: Loop, omega: Real) -> Complex:
-    """-1/L at i omega; 0 where L is infinite or vanishes."""
+    """Return -1/L at i omega; 0 where L is infinite or vanishes."""
     drive, fed_back = loop.parts(1j * omega)
     return np.asarray(-drive / np.where(fed_back == 0, np.inf, fed_back))
 
 
 def unit_crossings(loop: Loop, omega: Real) -> Real:
-    """Frequencies [rad/s] where |L(i w)| = 1."""
+    """Return the frequencies [rad/s] where |L(i w)| = 1."""
     if not loop.feeds_back:
         return np.empty(0)
 
@@ -305,7 +308,7 @@ def lowest(
 
 
 def highest(inverse: Callable[[Real], Real], omega: Real) -> tuple[float, float]:
-    """The highest value of a function given by its inverse, and its place; infinity where the inverse vanishes."""
+    """Return the highest value of a function and its place, from its inverse; infinity where that vanishes."""
     dip, at = lowest(inverse, omega)
     if not dip:
         return math.inf, at
@@ -314,7 +317,7 @@ def highest(inverse: Callable[[Real], Real], omega: Real) -> tuple[float, float]
 
 
 def _least(values: Real, where: Real) -> tuple[float, float]:
-    """The value of least size and its place; infinity and 0 where there is none."""
+    """Return the value of least size and its place; infinity and 0 where there is none."""
     if not values.size:
         return math.inf, 0.0
     i = int(np.argmin(abs(values)))

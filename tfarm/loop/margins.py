@@ -26,15 +26,13 @@ from tfarm.loop.loop_margins import (
     LoopMargins,
     PhaseCrossover,
 )
-from tfarm.loop.plane import cell_middles, plane
+from tfarm.loop.plane import plane
+from tfarm.loop.plane_axes import cell_middles
 from tfarm.loop.stability import Stability, is_quiet, stability
 from tfarm.loop.theorem import Lyapunov, Signs, lyapunov, signs_of_loop
 from tfarm.loop.windows import Windows, reach_words, windows_of
 from tfarm.records import frozen
 from tfarm.schema import Quantity
-
-EXACT_PEAK = replace(PEAK_SENSITIVITY, label=f"{PEAK_SENSITIVITY.label}, exact")
-GAIN_CROSSOVERS = Quantity("gain crossovers, abs(L) = 1", help="all in the frequency range, ascending")
 
 
 @frozen
@@ -80,7 +78,9 @@ class Margins(LoopAnalysis):
         return self._exact[1]
 
     @property
-    def exact_peak(self) -> Annotated[float | None, EXACT_PEAK]:
+    def exact_peak(
+        self,
+    ) -> Annotated[float | None, replace(PEAK_SENSITIVITY, label=f"{PEAK_SENSITIVITY.label}, exact")]:
         """The peak sensitivity."""
         return self._exact[2]
 
@@ -94,17 +94,18 @@ class Margins(LoopAnalysis):
         arm = loop.arm
         gains = loop.gains
         of_disk = (found.disk, found.peak_sensitivity)
-        if not arm.is_undamped and is_quiet(loop, self.stability.band):
+        is_damped = not arm.is_undamped
+        if is_damped and is_quiet(loop, self.stability.band):
             return found.delay, *of_disk
         if gains is None:
             return None, None, None
-        if arm.is_undamped and loop.theorem.energy is not None:
+        if not is_damped and loop.theorem.energy is not None:
             if gains.K2:
                 return 0.0, 0.0, math.inf
             # 1 + L = 1 + (Kp + i K1 w) theta, theta real: no dip deepens with w
             return 0.0 if loop.feeds_back else found.delay, *of_disk
         # with a rate gain alone L is in the right half-plane
-        is_passive = not arm.is_undamped and gains.K2 == gains.Kp == 0 and not arm.input_lags
+        is_passive = is_damped and gains.K2 == gains.Kp == 0 and not arm.input_lags
         return (None, *of_disk) if is_passive else (None, None, None)
 
     @property
@@ -117,11 +118,8 @@ class Margins(LoopAnalysis):
     def factor_intervals(self, delays: Real) -> list[Sequence[Window]]:
         """Return the intervals of a factor on the law, 0 to 4, at each further delay [s] (n,), from a map of both."""
         loop = self.stability.loop
-        return [
-            *plane(
-                loop, ("delay", "gain"), loop.law.delay + delays, cell_middles(0.0, 4.0, 40)
-            ).stable_intervals
-        ]
+        factors = cell_middles(0.0, 4.0, 40)
+        return list(plane(loop, ("delay", "gain"), loop.law.delay + delays, factors).stable_intervals)
 
     @cached_property
     def windows(self) -> dict[str, Windows]:
@@ -205,17 +203,27 @@ class Margins(LoopAnalysis):
         if not self.windows and loop.arm.has_elastic_link:
             return "no stability intervals: with an undamped link all modes meet on the axis"
         uncounted = [name for name in loop.law.numbers if self.windows and name not in self.windows]
-        return words + (f"; poles not counted along {', '.join(uncounted)}" if uncounted else "") or None
+        if uncounted:
+            words += f"; poles not counted along {', '.join(uncounted)}"
+        return words or None
 
     @property
-    def gain_crossovers(self) -> Annotated[tuple[GainCrossover, ...], GAIN_CROSSOVERS]:
+    def gain_crossovers(
+        self,
+    ) -> Annotated[
+        tuple[GainCrossover, ...],
+        Quantity("gain crossovers, abs(L) = 1", help="all in the frequency range, ascending"),
+    ]:
         """All in the frequency range, ascending; empty unless the loop is stable."""
         return () if self.in_band is None else self.in_band.gain_crossovers
 
     @property
     def phase_crossovers(
         self,
-    ) -> Annotated[tuple[PhaseCrossover, ...], replace(GAIN_CROSSOVERS, label="phase crossovers, L < 0")]:
+    ) -> Annotated[
+        tuple[PhaseCrossover, ...],
+        Quantity("phase crossovers, L < 0", help="all in the frequency range, ascending"),
+    ]:
         """All in the frequency range, ascending; empty unless the loop is stable."""
         return () if self.in_band is None else self.in_band.phase_crossovers
 

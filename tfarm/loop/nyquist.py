@@ -29,17 +29,6 @@ from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import At, Quantity
 from tfarm.spectrum.box import argument_change
 
-# rad, along a semicircle around a pole of L
-ARC = np.linspace(-math.pi / 2, math.pi / 2, 41)
-# radii of such an arc: points of the axis on either side, a dozen a decade
-APPROACH = np.geomspace(1.05, 1e3, 40)
-ON_AXIS = Quantity(
-    "poles on the axis to working precision", help="closed-loop poles with |Re s| < 1e-12 |s|, not at 0"
-)
-BY_NYQUIST = Quantity(
-    "unstable poles by Nyquist's criterion", help="unstable poles of L less the encirclements of -1"
-)
-
 
 @frozen
 class Nyquist:
@@ -62,21 +51,36 @@ class Nyquist:
     ] = 0
 
     @property
-    def on_axis(self) -> Annotated[int, ON_AXIS]:
+    def on_axis(
+        self,
+    ) -> Annotated[
+        int,
+        Quantity(
+            "poles on the axis to working precision",
+            help="closed-loop poles with |Re s| < 1e-12 |s|, not at 0",
+        ),
+    ]:
         """Number of poles on the axis to working precision, apart from that at 0."""
         return self.verdict.contour.near_axis
 
     @property
-    def unstable_by_nyquist(self) -> Annotated[int, BY_NYQUIST]:
+    def unstable_by_nyquist(
+        self,
+    ) -> Annotated[
+        int,
+        Quantity(
+            "unstable poles by Nyquist's criterion",
+            help="unstable poles of L less the encirclements of -1",
+        ),
+    ]:
         """Unstable closed-loop poles by Nyquist's criterion."""
         return self.unstable_open - self.encirclements
 
     @cached_property
     def sensitivity_peak(self) -> At | None:
         """The loop's own Ms with its frequency; None of an unstable loop."""
-        if self.verdict.in_band is None:
-            return None
-        return self.verdict.in_band.sensitivity_peak
+        band = self.verdict.in_band
+        return None if band is None else band.sensitivity_peak
 
 
 def nyquist(arm: Arm, law: AnyLaw) -> Nyquist:
@@ -109,12 +113,12 @@ def nyquist_of(verdict: LoopVerdict) -> Nyquist:
 
 
 def _difference(loop: Loop, s: Complex) -> Analytic:
-    """1 + L without its slope, as the contour is dense where it is steep."""
+    """Return 1 + L without its slope, as the contour is dense where it is steep."""
     return Analytic(1 + loop.loop_function(s), np.zeros_like(s), np.zeros_like(s))
 
 
 def upper_contour(loop: Loop, contour: LoopContour, band: float) -> tuple[Complex, NDArray[np.bool_]]:
-    """The contour from s = 0 (or right of a pole there) up the axis to the band, past each pole on its right.
+    """Return the contour from s = 0 (or right of a pole there) up the axis to the band, past each pole on its right.
 
     Each arc around a pole of L is smaller than its distance to the nearest closed-loop pole.  The radius is that where
     |L| is about 20, and at most a thousandth of the pole's frequency (at 0: of the first).
@@ -129,22 +133,25 @@ def upper_contour(loop: Loop, contour: LoopContour, band: float) -> tuple[Comple
     residue_at = 1e-6
     # of the same: the radius of an arc at most, so that it reaches no neighbour
     widest_indent = 1e-3
+    # radii of such an arc: points of the axis on either side, a dozen a decade
+    approach = np.geomspace(1.05, 1e3, 40)
+    # rad, along a semicircle around a pole of L
+    turns = np.linspace(-math.pi / 2, math.pi / 2, 41)
     poles = contour.on_curve
-    omega = contour.grid
-    scale = np.where(poles == 0, frequency_above_mode(loop.arm, 1), poles)
     pole = poles[:, None]
+    omega = contour.grid
+    is_resting = poles == 0
+    scale = np.where(is_resting, frequency_above_mode(loop.arm, 1), poles)
     step = residue_at * scale
+    beside_pole = loop.loop_function(np.where(is_resting, step, 1j * (poles + step)))
+    of_residue = indent_radius * step * abs(beside_pole)
     away = abs(contour.closed - 1j * pole)
-    of_residue = (
-        indent_radius * step * abs(loop.loop_function(np.where(poles == 0, step, 1j * (poles + step))))
-    )
     nearest = np.where(away > AXIS_SHARE * pole, away, math.inf).min(axis=1, initial=math.inf)
     radius = np.minimum(np.minimum(of_residue, widest_indent * scale), nearer * nearest)[:, None]
-    slow = np.geomspace(radius[0, 0], omega[0], slow_points) if 0 in poles else omega[:0]
-    approach = (pole + radius * np.r_[-APPROACH, APPROACH]).ravel()
-    axis = np.unique(np.r_[omega, slow, approach])
+    slow = np.geomspace(radius[0, 0], omega[0], slow_points) if is_resting.any() else omega[:0]
+    axis = np.unique(np.r_[omega, slow, (pole + radius * np.r_[-approach, approach]).ravel()])
     axis = axis[(axis > 0) & (axis <= band) & (abs(axis - pole) > radius).all(axis=0)]
-    arcs = (1j * pole + radius * np.exp(1j * ARC)).ravel()
+    arcs = (1j * pole + radius * np.exp(1j * turns)).ravel()
     arcs = arcs[arcs.imag >= 0]
     s = np.r_[1j * axis, arcs]
     is_arc = np.arange(axis.size + arcs.size) >= axis.size
@@ -153,7 +160,7 @@ def upper_contour(loop: Loop, contour: LoopContour, band: float) -> tuple[Comple
 
 
 def smooth(loop: Loop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, NDArray[np.bool_]]:
-    """The contour with more points on the axis where the drawn curve would have corners."""
+    """Return the contour with more points on the axis where the drawn curve would have corners."""
     # of the rim's radius: the longest straight piece of a drawn curve
     longest_piece = 0.02
     # of halving where they are longer
@@ -169,7 +176,7 @@ def smooth(loop: Loop, s: Complex, is_arc: NDArray[np.bool_]) -> tuple[Complex, 
 
 
 def compress_radius(L: Complex) -> Complex:
-    """L with its size r mapped to r/(1 + r): 1 is half-way, infinity is the rim, at a pole its point 1."""
-    size = abs(L)
-    inside = np.where(np.isinf(size), 1.0, L)
-    return np.asarray(np.where(np.isinf(size), 1.0, inside / (1 + abs(inside))))
+    """Return L with its size r mapped to r/(1 + r): 1 is half-way, infinity is the rim, at a pole its point 1."""
+    is_pole = np.isinf(abs(L))
+    inside = np.where(is_pole, 1.0, L)
+    return np.asarray(np.where(is_pole, 1.0, inside / (1 + abs(inside))))

@@ -29,19 +29,8 @@ from tfarm.response import transfer
 from tfarm.response.signals import Signals
 from tfarm.spectrum import Modes, modes
 
-# of order 1/2 as the parts are, few more never help where a panel holds one mode
+# of a panel: of order 1/2 as the parts are, few more never help where a panel holds one mode
 PANEL_SAMPLES = 24
-# of the size of a part on its panel: a panel whose polynomials miss by more is halved
-MOST_MISS = 1e-11
-# more mean that halving does not help
-MOST_PANELS = 400
-# where they are compared, in the panel: not at s = 0
-BETWEEN_SAMPLES = np.linspace(-0.97, 0.97, 40)
-_ANGLES = np.pi * (np.arange(PANEL_SAMPLES) + 0.5) / PANEL_SAMPLES
-# points of the first kind, where the samples are: none in the middle
-CHEBYSHEV = np.cos(_ANGLES)
-# weights of the polynomial through them
-BARYCENTRIC = (-1.0) ** np.arange(PANEL_SAMPLES) * np.sin(_ANGLES)
 Sensor = Literal["displacement", "moment"]
 
 
@@ -63,13 +52,16 @@ class Panels:
     error: float
 
 
-def loop_panels(arm: Arm, band: float, loop: ContinuousLoop | None = None) -> Panels:
+def loop_panels(arm: Arm, band: float, loop: ContinuousLoop | None = None, most_panels: int = 400) -> Panels:
     """Return the samples up to a band [rad/s], of hub angle and gauge or of the parts of a loop's law.
 
+    A panel whose polynomials miss a part by more than 1e-11 of its size there is halved, up to `most_panels`: more mean
+    that halving does not help.
     Raises ParameterError for an arm that cannot turn freely, ConvergenceError where halving panels does not help.
     """
     # steep places a panel: each mode has one of the own, the locked and the free hub
     steep_a_panel = 3
+    most_miss = 1e-11
     require(arm.has_rigid_mode, "arm", arm.name, "samples of a loop are of an arm that turns freely")
     order = 1 if arm.rate_loss else 2
     rows: Callable[[Complex], Complex] = partial(_hub_rows, arm, order)
@@ -84,42 +76,49 @@ def loop_panels(arm: Arm, band: float, loop: ContinuousLoop | None = None) -> Pa
     while waiting:
         low, high = waiting.pop()
         values, error = _panel(rows, low, high)
-        if error <= MOST_MISS:
+        if error <= most_miss:
             done.append((float(low), float(high), values, error))
         elif low == -high:
             waiting += [(low / 2, high / 2), (high / 2, high)]
         else:
             waiting += [(low, (low + high) / 2), ((low + high) / 2, high)]
-        if len(done) + len(waiting) > MOST_PANELS:
+        if len(done) + len(waiting) > most_panels:
             raise ConvergenceError("polynomials do not follow the loop's parts along the axis", high, error)
     lows, highs, parts, errors = zip(*sorted(done, key=lambda each: each[1]), strict=True)
     return Panels(band, np.array(lows), np.array(highs), np.stack(parts, axis=1), order, max(errors))
 
 
 def _hub_rows(arm: Arm, order: int, s: Complex) -> Complex:
-    """d, theta and m; without losses real: the imaginary part is rounding, and would be a loss next to a resonance."""
+    """Return d, theta and m; without losses real: an imaginary part of rounding would be a loss next to a resonance."""
     drive, (theta, _, gauge), scale = Signals(arm, AT_HUB).parts(s)
     both = np.stack([drive / s**order, theta, gauge / s**2]) * np.exp(scale - scale.real.max())
     return both.real + 0j if arm.is_reactive else both
 
 
 def _law_rows(loop: ContinuousLoop, at_rest: int, s: Complex) -> Complex:
-    """The drive times the law's denominator over s^at_rest, and what each part feeds back over the s^n of D."""
+    """Return the drive times the law's denominator over s^at_rest, and the feedback of each part over the s^n of D."""
     rig = loop.signals.parts(s)
-    (shares, whole) = loop.law.shares(s)
+    shares, whole = loop.law.shares(s)
     fed_back = np.exp(-s * loop.law.delay) * (shares * rig.numerators).sum(axis=1) / s**loop.zeros_at_origin
     return np.vstack([rig.drive * whole / s**at_rest, fed_back]) * np.exp(rig.scale - rig.scale.real.max())
 
 
 def _panel(rows: Callable[[Complex], Complex], low: float, high: float) -> tuple[Complex, float]:
-    """Samples of all parts on one panel, the largest 1, and the largest miss between them."""
+    """Return samples of all parts on one panel, the largest 1, and the largest miss between them."""
+    # Chebyshev points of the first kind: none in the middle
+    number = np.arange(PANEL_SAMPLES)
+    angles = np.pi * (number + 0.5) / PANEL_SAMPLES
+    points = np.cos(angles)
+    # not at s = 0
+    others = np.linspace(-0.97, 0.97, 40)
     middle = (low + high) / 2
     half = (high - low) / 2
-    both = rows(1j * (middle + half * np.r_[CHEBYSHEV, BETWEEN_SAMPLES]))
-    size = abs(both).max()
-    values = both[:, :PANEL_SAMPLES] / size
-    between = both[:, PANEL_SAMPLES:] / size
-    weights = BARYCENTRIC / (BETWEEN_SAMPLES[:, None] - CHEBYSHEV)
+    both = rows(1j * (middle + half * np.r_[points, others]))
+    both = both / abs(both).max()
+    values = both[:, :PANEL_SAMPLES]
+    between = both[:, PANEL_SAMPLES:]
+    # barycentric weights of the polynomial through the points
+    weights = (-1.0) ** number * np.sin(angles) / (others[:, None] - points)
     missed = abs(values @ weights.T / weights.sum(axis=1) - between)
     return values, float((missed.max(axis=1) / abs(values).max(axis=1)).max())
 
@@ -141,26 +140,28 @@ class Positions:
     @property
     def known_zeros(self) -> tuple[Complex, ...]:
         """The same, with 0 for a real or imaginary part below the error of a zero."""
-        # of the size of a zero: a smaller real or imaginary part of it is rounding
-        sensor_zero_error = 1e-8
-        parts = ((s, sensor_zero_error * abs(s)) for s in self.zeros)
-        return tuple(
-            np.where(abs(s.real) > least, s.real, 0.0) + 1j * np.where(abs(s.imag) > least, s.imag, 0.0)
-            for s, least in parts
-        )
+        return tuple(map(_without_rounding, self.zeros))
+
+
+def _without_rounding(s: Complex) -> Complex:
+    """Return zeros, with 0 for a real or imaginary part below 1e-8 of their size."""
+    least = 1e-8 * abs(s)
+    return np.where(abs(s.real) > least, s.real, 0.0) + 1j * np.where(abs(s.imag) > least, s.imag, 0.0)
 
 
 def sensed_places(arm: Arm, sensor: Sensor, x: Real, count: int) -> Real:
-    """The places x [m] at which a sensor reads any of the first modes: not an end that none moves, or bends."""
+    """Return the places x [m] at which a sensor reads any of the first modes: not an end that none moves, or bends."""
     # of a mode's largest: a reading no larger of any mode is none
     not_sensed = 1e-9
-    size = _fields(modes(arm, count), sensor, x)
-    return np.asarray(x[(abs(size) > not_sensed * abs(size).max(axis=1, keepdims=True)).any(axis=0)])
+    size = abs(_readings(modes(arm, count), sensor, x))
+    is_read = size > not_sensed * size.max(axis=1, keepdims=True)
+    return np.asarray(x[is_read.any(axis=0)])
 
 
-def _fields(found: Modes, sensor: Sensor, x: Real) -> Real:
-    """Reading of each flexible mode by a sensor at each x (modes, n)."""
-    return np.asarray((found.shape if sensor == "displacement" else found.moment)(x)[found.index > 0])
+def _readings(found: Modes, sensor: Sensor, x: Real) -> Real:
+    """Return the reading of each flexible mode by a sensor at each x (modes, n)."""
+    read = found.shape if sensor == "displacement" else found.moment
+    return np.asarray(read(x)[found.index > 0])
 
 
 def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
@@ -170,11 +171,11 @@ def positions(arm: Arm, sensor: Sensor, x: Real, count: int) -> Positions:
     """
     must_turn(arm)
     found = modes(arm, count)
-    field = _fields(found, sensor, x)
     band = frequency_above_mode(arm, count)
     zeros = []
     for place in x.tolist():
         every = transfer(arm, sensor, x=place).zeros(up_to=band).values
         zeros.append(every[(every.imag > 0) | ((every.imag == 0) & (every.real > 0))])
-    participation = field / abs(field).max(axis=1, keepdims=True)
+    readings = _readings(found, sensor, x)
+    participation = readings / abs(readings).max(axis=1, keepdims=True)
     return Positions(x, band, found.natural_frequency[found.index > 0], participation, tuple(zeros))

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Annotated, NamedTuple
 
@@ -38,38 +38,22 @@ from tfarm.loop.lines import (
     LawTerms,
     cross_axis,
     line_crossings,
-    round_on_line,
     static_edge,
     unstable_below,
     with_numbers,
 )
+from tfarm.loop.plane_axes import Axis, cell_middles
 from tfarm.loop.stability import band_of_family, verdict_on
 from tfarm.loop.windows import theorem_edges, theorem_windows
 from tfarm.records import frozen
 from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
-from tfarm.spectrum.gains import PAPER_GAINS, default_gains, rate_unit
+from tfarm.spectrum.gains import default_gains
 from tfarm.spectrum.table import hub_locked
 
-COUNTS = Quantity(
-    key="unstable_roots", help="unstable poles at each point, rows upwards; inf where infinitely many"
-)
-BOUNDARY = Quantity(
-    key="boundary", help="both gains and the frequency [rad/s] with poles on the imaginary axis"
-)
 # count of infinitely many unstable poles
 INFINITE = -1
-# decades that the linear part of an axis takes on each side of 0, as matplotlib's `linscale` has it
-LINEAR_SCALE = 0.5
-# factor on values there
-LINEAR_SHARE = LINEAR_SCALE / (1 - 1 / 10)
-# and the lowest value at which unstable gains are searched
-DEEPEST_MOMENT_GAIN = -50.0
-# of the picture: longer pieces of the boundary look straight, and are cut
-SHORT_SEGMENT = 0.008
-# of the picture: a piece longer than that after all cuts is a jump through infinity, and not drawn
-LONG_SEGMENT = 0.03
 
 
 class BoundaryLines(NamedTuple):
@@ -130,18 +114,31 @@ class Plane(PlaneOfCounts):
         return controller(self.law, self.arm)
 
     @property
-    def counts(self) -> Annotated[list[list[int | float]], COUNTS]:
+    def counts(
+        self,
+    ) -> Annotated[
+        list[list[int | float]],
+        Quantity(
+            key="unstable_roots", help="unstable poles at each point, rows upwards; inf where infinitely many"
+        ),
+    ]:
         """Unstable poles over the grid, rows upwards, infinity where they are infinitely many."""
-        return [[math.inf if count == INFINITE else count for count in row] for row in self.unstable.tolist()]
+        return np.where(self.unstable == INFINITE, math.inf, self.unstable.astype(object)).tolist()
 
     @property
-    def boundary_inside(self) -> Annotated[list[list[float]], BOUNDARY]:
+    def boundary_inside(
+        self,
+    ) -> Annotated[
+        list[list[float]],
+        Quantity(
+            key="boundary", help="both gains and the frequency [rad/s] with poles on the imaginary axis"
+        ),
+    ]:
         """The points of `boundary` inside the plane."""
-        return [
-            point
-            for point in self.boundary.tolist()
-            if all(values[0] <= value <= values[-1] for value, values in zip(point, self.axes, strict=False))
-        ]
+        gains = self.boundary[:, :2]
+        low = [self.x[0], self.y[0]]
+        high = [self.x[-1], self.y[-1]]
+        return self.boundary[((gains >= low) & (gains <= high)).all(axis=1)].tolist()
 
     @property
     def is_of_gains(self) -> bool:
@@ -216,7 +213,8 @@ def gain_map(
         return plane(ContinuousLoop(Case(arm, HubFeedback(Kp=Kp))), PLANE, K1, K2)
     loop = ContinuousLoop(Case(arm, law))
     require(not Kp, ANGLE_GAIN, Kp, "give Kp in the law, or no law")
-    vary = PLANE if vary is None and loop.is_of_gains else vary
+    if vary is None and loop.is_of_gains:
+        vary = PLANE
     match vary:
         case (str() as across, str() as up):
             return plane(loop, (across, up), K1, K2)
@@ -234,17 +232,19 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
     require(vary[0] != vary[1], "vary", list(vary), "two different numbers of the law")
     is_of_gains = vary == PLANE and loop.is_of_gains
     if is_of_gains:
-        loop = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
+        loop = loop_at(loop, PLANE, (0.0, 0.0))
     # most values of a map, along one number of a law, and along one gain
     most = 2000 if loop.is_of_gains else 400
     x = check_ascending(vary[0], x, 2, most)
     y = check_ascending(vary[1], y, 2, most)
     across = (float(x[0]), float(x[-1]))
     up = (float(y[0]), float(y[-1]))
+    remedy = (
+        "a leading coefficient keeps its sign in a map, as without it the order is another: a range without 0"
+    )
     for name, (low, high) in zip(vary, (across, up), strict=True):
-        remedy = "a leading coefficient keeps its sign in a map, as without it the order is another: a range without 0"
         require(not name.endswith(LEADING) or low * high > 0, name, [low, high], remedy)
-    corners = [_at(loop, vary, each) for each in itertools.product(across, up)]
+    corners = [loop_at(loop, vary, each) for each in itertools.product(across, up)]
     if _is_known_everywhere(loop) and tuple(ON.get(n, n) for n in vary) == PLANE:
         counts = _known_counts(loop, x, y)
         return Plane(loop, vary, x, y, counts, np.empty((0, 3)), 0.0, [])
@@ -253,8 +253,8 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
         return replace(turned, vary=vary, x=x, y=y, unstable=turned.unstable.T.copy(), crossings=[])
     band, is_quiet = band_of_family(corners)
     # from K2 = 0, where the hub is passive, a count is carried to the range: real poles between pass through 0 too
-    reach = (min(up[0], 0.0), max(up[1], 0.0)) if vary == PLANE else up
-    found = _columns(loop, vary, x, reach, band)
+    searched = (min(up[0], 0.0), max(up[1], 0.0)) if vary == PLANE else up
+    found = _columns(loop, vary, x, searched, band)
     crossing = np.concatenate([y[:0], *(each.gain for each in found)])
     at = 0.0 if vary == PLANE else float(y[_farthest(y, crossing)])
     there = _counts_across(loop.having(vary[1], at), vary[0], x, band)
@@ -262,26 +262,26 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
     edge = boundary(loop, np.asarray(grid(loop.arm, band))) if is_of_gains else np.empty((0, 3))
     done = Plane(loop, vary, x, y, unstable, edge, band, found)
 
-    def counted(*point: float) -> int | None:
+    def count_at(*point: float) -> int | None:
         try:
-            return unstable_below(_at(loop, vary, point), band)
+            return unstable_below(loop_at(loop, vary, point), band)
         except ConvergenceError:
             # a pole on the axis to working precision, which is on either side
             return None
 
     # poles may enter or leave the band through its top, between the corners
-    if not is_quiet or any(part in name for part in not_affine for name in vary):
-        remedy = (
-            f"some cross the end of the frequency range, {band:.4g} rad/s; ask for a smaller range of values"
-        )
-        done.must_agree(counted, remedy)
+    is_affine = not any(part in name for part, name in itertools.product(not_affine, vary))
+    if not (is_quiet and is_affine):
+        reach = f"{band:.4g} rad/s"
+        remedy = f"some cross the end of the frequency range, {reach}; ask for a smaller range of values"
+        done.must_agree(count_at, remedy)
     return done
 
 
 def _columns(
     loop: ContinuousLoop, vary: tuple[str, str], x: Real, up: Window, band: float
 ) -> list[Crossings]:
-    """The crossings along the second number at each value of the first; of gains of parts all at once."""
+    """Return the crossings along the second number at each value of the first; of gains of parts all at once."""
     terms = LawTerms(loop.signals, loop.law, [])
     if None in map(terms.part, vary):
         return [line_crossings(loop.having(vary[0], value), vary[1], *up, band) for value in x.tolist()]
@@ -291,32 +291,34 @@ def _columns(
     return [column() for column in cross_axis(loop.arm, terms, band, loops)]
 
 
-def _at(loop: ContinuousLoop, vary: tuple[str, str], point: tuple[float, ...]) -> ContinuousLoop:
-    """The loop at a point of the plane of two numbers of its law."""
+def loop_at(loop: ContinuousLoop, vary: tuple[str, str], point: tuple[float, ...]) -> ContinuousLoop:
+    """Return the loop at a point of the plane of two numbers of its law."""
     return loop.under(with_numbers(loop.law, dict(zip(vary, point, strict=True))))
 
 
 def _is_known_everywhere(loop: ContinuousLoop) -> bool:
-    """Whether a theorem decides every mode for any K1 and K2."""
+    """Return whether a theorem decides every mode for any K1 and K2."""
     return loop.is_moved_at_hub_alone and loop.arm.reads_hub_moment and not loop.arm.input_lags
 
 
 def _known_counts(loop: ContinuousLoop, K1: Real, K2: Real) -> NDArray[np.int64]:
-    """Unstable poles without damping: one count for each side of each line on which modes meet the axis."""
+    """Return unstable poles without damping: one count for each side of each line on which modes meet the axis."""
     limits = float(K2[0]), float(K2[-1])
     static = static_edge(loop.having(RATE_GAIN, default_gains(loop.arm).K1), MOMENT_GAIN, limits)
     unstable = np.zeros((K2.size, K1.size), dtype=np.int64)
     side = np.sign(K1 + loop.arm.rate_loss) + 3 * np.sign(K2 - loop.arm.input_per_torque)[:, None]
-    side += 0.0 if static is None else 9.0 * (static.t < K2)[:, None]
+    if static is not None:
+        side += 9.0 * (static.t < K2)[:, None]
     for each in np.unique(side):
-        row, column = (int(np.median(of)) for of in np.nonzero(side == each))
-        found = verdict_on(_at(loop, PLANE, (float(K1[column]), float(K2[row]))))
-        unstable[side == each] = INFINITE if found.unstable_roots_infinite else found.unstable_roots
+        is_there = side == each
+        row, column = np.median(np.nonzero(is_there), axis=1).astype(int)
+        found = verdict_on(loop_at(loop, PLANE, (float(K1[column]), float(K2[row]))))
+        unstable[is_there] = INFINITE if found.unstable_roots_infinite else found.unstable_roots
     return unstable
 
 
 def _counts_across(row: ContinuousLoop, name: str, x: Real, band: float) -> NDArray[np.int64]:
-    """Unstable poles at each x along a row, from one count at a value far from its crossings; each of a delay."""
+    """Return unstable poles at each x along a row, from one count far from its crossings; of a delay one at each."""
     if name == "delay":
         return np.array([unstable_below(row.having(name, value), band) for value in x.tolist()])
     across = line_crossings(row, name, float(x[0]), float(x[-1]), band)
@@ -325,18 +327,18 @@ def _counts_across(row: ContinuousLoop, name: str, x: Real, band: float) -> NDAr
 
 
 def _farthest(values: Real, at: Real) -> int:
-    """Index of the value that is farthest from all crossings; of the middle one where there are none."""
+    """Return the index of the value that is farthest from all crossings; of the middle one where there are none."""
     if at.size:
         return int(np.argmax(abs(values[:, None] - at).min(axis=1)))
     return values.size // 2
 
 
 def boundary(loop: ContinuousLoop, omega: Real) -> Real:
-    """K1 and K2 with poles at +-i w, the other gains those of the loop, and w: (n, 3), in the order of omega."""
+    """Return K1 and K2 with poles at +-i w, the other gains those of the loop, and w: (n, 3), in the order of omega."""
     if loop.arm.loses_at_hub_alone:
         # both equations are one
         return np.empty((0, 3))
-    apart = loop.under(with_numbers(loop.law, dict.fromkeys(PLANE, 0.0)))
+    apart = loop_at(loop, PLANE, (0.0, 0.0))
     terms = LawTerms(apart.signals, apart.law, [])
     rows = terms.at(1j * omega)
     N = terms.weights @ rows
@@ -350,95 +352,16 @@ def boundary(loop: ContinuousLoop, omega: Real) -> Real:
     return points[np.isfinite(points).all(1)]
 
 
-def ranges_of(arm: Arm) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Default ranges of K1 and K2 of a map, in the units of the rig."""
-    K1 = 1.0 if arm.is_uniform else default_gains(arm).K1 / PAPER_GAINS.K1
-    K2 = arm.input_per_torque
-    # the stable region of the paper's arm, and around
-    (low, high) = (-1.0, 3.0)
-    (lower, upper) = (-2.0, 2.0)
-    return (low * K1, high * K1), (lower * K2, upper * K2)
-
-
-def cell_middles(low: float, high: float, number: int) -> Real:
-    """The middles of `number` equal parts from low to high: none of them on a line K1 = 0 unless by chance."""
-    values = low + (high - low) * (np.arange(number) + 0.5) / number
-    return np.array([round_on_line(value, (low, high)) for value in values.tolist()])
-
-
-@dataclass(frozen=True)
-class Axis:
-    """One axis of the map: linear within +-`linear`, logarithmic beyond (all linear where `linear` is infinite)."""
-
-    low: float
-    high: float
-    linear: float = math.inf
-
-    @property
-    def is_linear(self) -> bool:
-        """Whether it is linear throughout."""
-        return math.isinf(self.linear)
-
-    def place(self, x: Real) -> Real:
-        """Places of values along the axis, 0 to 1."""
-        low, high = self._stretched(np.array([self.low, self.high]))
-        return np.asarray((self._stretched(np.asarray(x, float)) - low) / (high - low))
-
-    def grid(self, number: int) -> Real:
-        """Values at `number` places of even distance."""
-        low, high = self._stretched(np.array([self.low, self.high]))
-        y = cell_middles(low, high, number)
-        if self.is_linear:
-            return y
-        size = abs(y) / LINEAR_SHARE, abs(y) - LINEAR_SHARE
-        return np.asarray(
-            self.linear * np.sign(y) * np.minimum(size[0], 1.0) * 10.0 ** np.maximum(size[1], 0.0)
-        )
-
-    def _stretched(self, x: Real) -> Real:
-        """x where linear; else x over `linear` up to 1, then decades: matplotlib's "symlog"."""
-        if self.is_linear:
-            return x
-        size = abs(x) / self.linear
-        return np.asarray(
-            np.sign(x) * (LINEAR_SHARE * np.minimum(size, 1.0) + np.log10(np.maximum(size, 1.0)))
-        )
-
-    @classmethod
-    def of(cls, values: Real) -> Axis:
-        """The axis on which a grid (n,), ascending, is nearly even: linear, or logarithmic beyond its smallest size."""
-        low = float(values[0])
-        high = float(values[-1])
-        # 1e-9 of its range: by less may the steps of an even grid differ
-        if np.ptp(np.diff(values)) <= 1e-9 * (high - low):
-            return cls(low, high)
-        return cls(low, high, float(abs(values[values != 0]).min()))
-
-
-def rate_axis(arm: Arm) -> Axis:
-    """The axis of the rate gain, just below 0 to 10 J w1, logarithmic from well below the default gain on."""
-    unit = rate_unit(arm)
-    linear = 10.0 ** math.floor(math.log10(default_gains(arm)[RATE_GAIN]))
-    # at 10 J w1 the hub of a rigid arm slows down within 0.1/w1
-    return Axis(-linear, 10 * unit, linear)
-
-
-def rate_columns(arm: Arm, x: Axis, number: int) -> Real:
-    """Rate gains at `number` even places of an axis, without those at which the arm is unstable for any moment gain.
-
-    A free hub is unstable where its gain exceeds the friction: 1 + L is below 0 next to s = 0, and above it far right.
-    """
-    across = x.grid(number)
-    least = -arm.rate_loss
-    if arm.has_rigid_mode:
-        return across[across > least]
-    return across[across != least]
+def deepest_moment_gain(arm: Arm) -> float:
+    """Return the lowest moment gain at which unstable gains are searched."""
+    return -50.0 * arm.input_per_torque
 
 
 def moment_axis(arm: Arm, x: Axis) -> Axis:
-    """The axis of the moment gain, -4 to 2 times `input_per_torque`, or down to the lowest unstable gain."""
-    # in units of `input_per_torque`, the range that is shown, and the lowest value that is searched
-    low, high, deepest = (each * arm.input_per_torque for each in (-4.0, 2.0, DEEPEST_MOMENT_GAIN))
+    """Return the axis of the moment gain, -4 to 2 times `input_per_torque`, or down to the lowest unstable gain."""
+    low = -4.0 * arm.input_per_torque
+    high = 2.0 * arm.input_per_torque
+    deepest = deepest_moment_gain(arm)
     if arm.is_undamped:
         return Axis(low, high)
     # 32 columns of the picture in which unstable gains are searched
@@ -453,37 +376,48 @@ def moment_axis(arm: Arm, x: Axis) -> Axis:
 
 
 def edge(found: Plane, x: Axis, y: Axis) -> Real:
-    """The boundary in the picture, refined where it is coarse, with a row of nan after each of its parts."""
+    """Return the boundary in the picture, refined where it is coarse, with a row of nan after each of its parts."""
+    # of the picture: longer pieces of the boundary do not look straight, and are cut
+    short = 0.008
+    # of the picture: a piece longer than that after all cuts is a jump through infinity, and not drawn
+    long = 0.03
     points = found.boundary
-    loop = found.loop
     # rounds of cutting at most: 2^-30 of a step between frequencies is less than a pixel
     for _ in range(30):
         length, is_seen = _segments(points, x, y)
         low = points[:-1, 2]
         high = points[1:, 2]
         middle = np.sqrt(low * high)
-        is_coarse = (length > SHORT_SEGMENT) & is_seen & (low < middle) & (middle < high)
+        is_coarse = (length > short) & is_seen & (low < middle) & (middle < high)
         if not is_coarse.any():
             break
-        points = np.concatenate([points, boundary(loop, middle[is_coarse])])
+        points = np.concatenate([points, boundary(found.loop, middle[is_coarse])])
         points = points[np.argsort(points[:, 2])]
     length, is_seen = _segments(points, x, y)
-    parts = np.split(points, np.flatnonzero(~is_seen | (length >= LONG_SEGMENT)) + 1)
+    parts = np.split(points, np.flatnonzero(~is_seen | (length >= long)) + 1)
     gap = np.full((1, 3), np.nan)
-    return np.concatenate([gap[:0], *(np.concatenate([part, gap]) for part in parts if len(part) > 1)])
+    drawn = [gap[:0]]
+    for part in parts:
+        if len(part) > 1:
+            drawn += [part, gap]
+    return np.concatenate(drawn)
 
 
 def _segments(points: Real, x: Axis, y: Axis) -> tuple[Real, NDArray[np.bool_]]:
-    """The drawn length of each segment, and whether it may pass through the picture."""
+    """Return the drawn length of each segment, and whether it may pass through the picture."""
     places = np.array([x.place(points[:, 0]), y.place(points[:, 1])])
-    ends = np.sort([places[:, :-1], places[:, 1:]], axis=0)
-    return np.hypot(*np.diff(places)), np.asarray(((ends[1] >= 0) & (ends[0] <= 1)).all(axis=0))
+    low = np.minimum(places[:, :-1], places[:, 1:])
+    high = np.maximum(places[:, :-1], places[:, 1:])
+    is_seen = ((high >= 0) & (low <= 1)).all(axis=0)
+    return np.hypot(*np.diff(places)), np.asarray(is_seen)
 
 
 def stable_edge(found: Plane) -> Real:
-    """K1 > 0, K2 and frequency [rad/s] (n, 3) where pairs of poles cross at an end of a stability interval."""
-    columns = zip(found.x.tolist(), found.crossings, found.stable_intervals, strict=True)
-    ends = [(K1, t, at) for K1, column, stable in columns for t, at, _ in column if t in np.ravel(stable)]
+    """Return K1 > 0, K2 and frequency [rad/s] (n, 3) where pairs of poles cross at an end of a stability interval."""
+    ends = []
+    for K1, column, stable in zip(found.x.tolist(), found.crossings, found.stable_intervals, strict=True):
+        edges = np.ravel(stable)
+        ends += [(K1, each.t, each.at) for each in column if each.t in edges]
     points = np.reshape(ends, (-1, 3))
     return points[(points[:, 0] > 0) & (points[:, 2] > 0) & np.isfinite(points[:, 2])]
 
@@ -497,7 +431,7 @@ def boundary_lines(found: Plane, x: Axis, y: Axis) -> BoundaryLines:
 
 
 def static_edges(found: Plane) -> tuple[float | None, float | None]:
-    """The gains at which a real pole passes through 0: an upright line of the boundary, and a level one."""
+    """Return the gains at which a real pole passes through 0: an upright line of the boundary, and a level one."""
     upright = found.upright if found.arm.has_rigid_mode and found.Kp == 0 else None
     loop = found.loop
     up = float(abs(found.y).max())

@@ -22,7 +22,7 @@ from tfarm.case import Case
 from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.loop.continuous import ContinuousLoop, frequency_above_mode, steep_places
-from tfarm.loop.theorem import CONSERVES, GIVES
+from tfarm.loop.theorem import Energy
 from tfarm.records import frozen
 from tfarm.reduced.modal import closed_loop_matrix, in_series, pade
 from tfarm.response.frequency import AXIS_SHARE
@@ -41,28 +41,14 @@ from tfarm.spectrum.table import first_frequency
 
 # poles listed where no count is asked for
 USUAL_POLES = 10
-# times that edge, and a law's fastest corner: the end of a search of real poles
-FAR_RIGHT = 1e5
-# that a box reaches at most: an improper law may have poles so far right
-MOST_HEIGHTS_RIGHT = 1e8
 # of 1/delay: further left a delayed loop has ever more poles, and all of them are fast
 LATE = 2.0
-# Starts of Newton's method affect the time alone: the winding number counts the zeros that they missed.
 # the number of the pole below the first mode that no mode of the link is near
 HUB = 0
-# order of the approximation of a delay in a model
-PADE = 8
-# of a box that may not reach above the shear cut-off
-SHRUNK_HEIGHTS = tuple(1 / factor for factor in TRIED_HEIGHTS)
-
-
-ENDS_AT_SHEAR = Quantity(
-    "ends at the shear cut-off, sqrt(kGA/rhoI)", help="no more bending modes lie below it: the list is whole"
-)
 
 
 def count_with_mirrors(zeros: Complex) -> int:
-    """Number of zeros with their conjugates, from those with Im s >= 0."""
+    """Return the number of zeros with their conjugates, from those with Im s >= 0."""
     return int(np.where(zeros.imag > 0, 2, 1).sum())
 
 
@@ -77,7 +63,13 @@ class Poles:
     loop: Annotated[ContinuousLoop, Quantity(flat=True)]
     values: Annotated[Complex, Quantity("s", "1/s", 12, "closed-loop poles with Im s >= 0", key="poles")]
     box: Annotated[Box, Quantity("box: Re s from, to, Im s from, to", help="searched, and complete")]
-    ends_at_shear_cutoff: Annotated[bool, ENDS_AT_SHEAR] = False
+    ends_at_shear_cutoff: Annotated[
+        bool,
+        Quantity(
+            "ends at the shear cut-off, sqrt(kGA/rhoI)",
+            help="no more bending modes lie below it: the list is whole",
+        ),
+    ] = False
     discs: Annotated[
         tuple[Disc, ...] | None, Quantity(help="enclosures of the poles apart from 0, certified")
     ] = None
@@ -102,11 +94,12 @@ class Poles:
 
         A real part below working precision decides nothing; without damping a theorem decides.
         """
-        size = abs(self.values)
-        right = self.values.real > AXIS_SHARE * size
-        if self.loop.theorem.energy == GIVES:
-            right |= (self.values.imag > 0) & (abs(self.values.real) <= AXIS_SHARE * size)
-        return count_with_mirrors(self.values[right])
+        s = self.values
+        least = AXIS_SHARE * abs(s)
+        right = s.real > least
+        if self.loop.theorem.energy == Energy.SUPPLY:
+            right |= (s.imag > 0) & (abs(s.real) <= least)
+        return count_with_mirrors(s[right])
 
     @property
     def count(self) -> int:
@@ -124,7 +117,7 @@ class Poles:
         return float(self.moving.real.max(initial=-np.inf))
 
     def certified(self, digits: int = DOUBLE_DIGITS) -> Poles:
-        """The same with the discs of `certify`."""
+        """Return the same with the discs of `certify`."""
         return replace(self, discs=self.certify(digits))
 
     def certify(self, digits: int = DOUBLE_DIGITS) -> tuple[Disc, ...]:
@@ -157,12 +150,14 @@ def closed_loop_poles(arm: Arm, law: AnyLaw, count: int | None = None) -> Poles:
     if count is not None:
         count = whole("count", count, 1, most_poles, f"a whole number from 1 to {most_poles}")
     loop = ContinuousLoop(Case(arm, law))
-    wanted, limit = (USUAL_POLES, loop.arm.shear_cutoff) if count is None else (count, math.inf)
+    wanted = count or USUAL_POLES
+    limit = math.inf if count else loop.arm.shear_cutoff
     number = wanted + 2
     while True:
         height = frequency_above_mode(loop.arm, number)
         if height >= limit:
-            poles = poles_below(loop, limit, factors=SHRUNK_HEIGHTS)
+            # no box reaches above the shear cut-off
+            poles = poles_below(loop, limit, factors=tuple(1 / factor for factor in TRIED_HEIGHTS))
             if poles.values.size <= wanted:
                 return replace(poles, ends_at_shear_cutoff=True)
         else:
@@ -195,7 +190,7 @@ def poles_below(
         loop.function, lambda top: box_of(loop, top, late), height, starts, known, factors
     )
     # without losses a simple zero is its own mirror image, and its real part is rounding
-    is_even = loop.is_lossless or (loop.arm.is_undamped and loop.theorem.energy == CONSERVES)
+    is_even = loop.is_lossless or (loop.arm.is_undamped and loop.theorem.energy == Energy.CONSTANT)
     on_axis = is_even & (abs(found.real) <= AXIS_SHARE * abs(found))
     found = np.where(on_axis, 1j * found.imag, found)
     upper = found[found.imag >= 0]
@@ -204,7 +199,7 @@ def poles_below(
 
 
 def box_of(loop: ContinuousLoop, height: float, late: float = LATE) -> Box:
-    """A box of that height, right of the law's poles and until |L| is small; left short of -1/C and -late/delay."""
+    """Return a box of that height, right to where |L| is small, past the law's poles; left to -1/C and -late/delay."""
     # times the rightmost pole of a law, where L is infinite: the nearest right edge that is tried
     beyond_own = 1.1
     own = loop.law.poles
@@ -214,29 +209,35 @@ def box_of(loop: ContinuousLoop, height: float, late: float = LATE) -> Box:
     if own.real.max(initial=0.0) > farthest:
         fastest = complex(own[own.real.argmax()])
         why = f"law: its pole at {fastest:.3g} 1/s is farther right than any box, as its den begins next to 0"
-        raise ConvergenceError(
-            f"{why}; begin it with 0, which is another law, or a larger number", fastest, height
-        )
+        text = f"{why}; begin it with 0, which is another law, or a larger number"
+        raise ConvergenceError(text, fastest, height)
     right = RIGHT_OF_AXIS * height
     if own.size:
-        right = beyond_own * max([right, *own.real.tolist()])
+        right = beyond_own * max(right, float(own.real.max()))
     right = quiet_edge(loop, right, height)
-    clear = TOWARD_SINGULAR / C if C else np.inf
-    left = min(HEIGHTS_LEFT * height, clear, late / loop.law.delay if loop.law.delay else np.inf)
+    left = HEIGHTS_LEFT * height
+    if C:
+        left = min(left, TOWARD_SINGULAR / C)
+    if loop.law.delay:
+        left = min(left, late / loop.law.delay)
     return Box(-float(left), right, -height, height)
 
 
 def quiet_edge(loop: ContinuousLoop, right: float, height: float) -> float:
-    """The right edge [1/s] of a box of that height, from `right` on: where 1 + L has no zero, or `MOST_HEIGHTS_RIGHT`.
+    """Return the right edge [1/s] of a box of that height, from `right` on: where 1 + L has no zero, or 1e8 heights.
 
     There Re L > -1/2, on the edge and at a few places beyond; L > 0 may be large, as on a hub without inertia.  On the
     real axis 1 + L keeps its sign for five decades more, and beyond the fastest corner of a law, where the inertia of a
     light hub begins to matter.
     """
+    # that a box reaches at most: an improper law may have poles so far right
+    most_heights = 1e8
     # of L, so that 1 + L has no zero
     least_real_part = -0.5
     # times the right edge of a box, where L is evaluated again
     right_of_edge = (2.0, 5.0, 20.0)
+    # times the right edge, and a law's fastest corner: the end of the search of real poles
+    beyond_edge = 1e5
     beyond_corner = 10.0
     # of the real axis up to there, on which 1 + L is smooth
     far_points = 41
@@ -246,18 +247,19 @@ def quiet_edge(loop: ContinuousLoop, right: float, height: float) -> float:
     right_points = 60
     edge = 1j * np.linspace(0.0, height, right_points)
     corner = float(abs(loop.law.poles).max(initial=0.0))
-    while right < MOST_HEIGHTS_RIGHT * height:
+    while right < most_heights * height:
         L = loop.loop_function(np.r_[right + edge, right * np.array(right_of_edge)])
         if L.real.min() > least_real_part:
             break
         right *= right_grows
-    far = np.geomspace(right, max(FAR_RIGHT * right, beyond_corner * corner), far_points)
+    far = np.geomspace(right, max(beyond_edge * right, beyond_corner * corner), far_points)
     # powers of s may overflow so far right: these points are left out
     with np.errstate(all="ignore"):
         real_part = loop.loop_function(far.astype(complex)).real
-    far = far[np.isfinite(real_part)]
-    is_above = real_part[np.isfinite(real_part)] > -1
-    (turns,) = np.nonzero(is_above[1:] != is_above[:-1])
+    is_finite = np.isfinite(real_part)
+    far = far[is_finite]
+    is_above = real_part[is_finite] > -1
+    turns = np.flatnonzero(is_above[1:] != is_above[:-1])
     return float(far[turns[-1] + 1] if turns.size else right)
 
 
@@ -308,38 +310,42 @@ def poles_by_mode(poles: Complex, open_loop: Mapping[int, complex]) -> dict[int,
     moves a mode here: such a pole belongs to none.
     """
     farthest = 1.0
-    modes = list(open_loop)
+    modes = np.array(list(open_loop))
     own = np.array(list(open_loop.values()))
     apart = np.minimum(abs(np.log(poles)[:, None] - np.log(own)), farthest)
     rows, columns = linear_sum_assignment(apart)
     near = apart[rows, columns] < farthest
-    found = {
-        modes[column]: complex(poles[row]) for row, column in zip(rows[near], columns[near], strict=True)
-    }
-    others = np.delete(poles, rows[near])
-    below = others[abs(others) < min((abs(s) for s in found.values()), default=0.0)]
-    return dict(sorted([*found.items(), *([(HUB, complex(below[0]))] if below.size == 1 else [])]))
+    rows = rows[near]
+    found = dict(zip(modes[columns[near]].tolist(), poles[rows].tolist(), strict=True))
+    others = np.delete(poles, rows)
+    below = others[abs(others) < min(map(abs, found.values()), default=0.0)]
+    if below.size == 1:
+        found[HUB] = complex(below[0])
+    return dict(sorted(found.items()))
 
 
 def poles_of_model(loop: ContinuousLoop, plant: Matrices) -> Complex:
-    """Poles of a model of the rig, from its input to the law's signals, under the law; a delay is a Pade fraction."""
+    """Return poles of a model of the rig, from its input to the law's signals, under the law.
+
+    A delay is a Pade fraction of order 8.
+    """
     law = loop.law.matrices()
     if loop.law.delay:
-        law = in_series(law, pade(loop.law.delay, PADE).matrices())
+        law = in_series(law, pade(loop.law.delay, 8).matrices())
     return np.linalg.eigvals(closed_loop_matrix(plant, law)).astype(complex)
 
 
 def first_poles(poles: Poles, count: int | None) -> Poles:
-    """The first `count` poles, or the usual ones and all real ones, in a lower box of just these.
+    """Return the first `count` poles, or the usual ones and all real ones, in a lower box of just these.
 
     Raises ParameterError where a count separates real poles.
     """
     values = poles.values
-    real = int((poles.values.imag == 0).sum())
-    count = max(USUAL_POLES, real) if count is None else count
-    kept = values[:count]
-    parts_real = count < values.size and values[count].imag == kept[-1].imag == 0
-    require(not parts_real, "count", count, f"more: {real} poles are real")
-    top = poles.box.im_max if count == values.size else float((kept[-1].imag + values[count].imag) / 2)
-    left, right, _, _ = poles.box
-    return Poles(poles.loop, kept, Box(left, right, -top, top))
+    real = int((values.imag == 0).sum())
+    count = count or max(USUAL_POLES, real)
+    left, right, _, top = poles.box
+    if count < values.size:
+        last, following = values[count - 1 : count + 1].imag.tolist()
+        require(last or following, "count", count, f"more: {real} poles are real")
+        top = (last + following) / 2
+    return Poles(poles.loop, values[:count], Box(left, right, -top, top))

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from tfarm.arm import PLANE, RATE_GAIN
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing.turning import loose
 from tfarm.loop.sampled import Sampled
@@ -33,7 +33,7 @@ SAMPLED_LOCUS_VALUES = 61
 RIM = 1.12
 # and up to which a branch is drawn, so that its line runs out of the picture
 DRAWN_RADIUS = 1.2 * RIM
-# of the rate gain: below the end of its locus, and above its own value
+# times the rate gain of a loop, below and above, its locus reaches at least
 STRONGER = 10.0
 
 
@@ -121,7 +121,7 @@ class ModeTable:
 
 
 def first_order(loop: Sampled, poles: Whole) -> Real:
-    """Change of ln|z| (parts, poles) to first order by each part of the law alone, at open-loop poles by number."""
+    """Return the first-order change of ln|z| (parts, poles) by each part of the law, at open-loop poles by number."""
     z = loop.pulse.multipliers[poles]
     _, *rows = loop.rig.terms(z, poles, np.zeros(z.size))
     whole = (loop.pulse.shifts[poles][:, None] - loop.in_z.poles).prod(axis=1)
@@ -137,36 +137,33 @@ def mode_table(loop: Sampled) -> ModeTable:
     upper = np.nonzero((pulse.poles.imag > 0) & (pulse.mode > 0) & (own > -20.0))[0]
     upper = upper[np.argsort(pulse.mode[upper])]
     index = pulse.mode[upper]
-    table = modes(pulse.plant.arm, max(1, int(index.max(initial=1))))
+    table = modes(pulse.plant.arm, int(index.max(initial=1)))
     T = pulse.sampling.period
     w = table.natural_frequency[np.searchsorted(table.index, index)]
     by = first_order(loop, upper)
-    reads = [part.signals for part in loop.law.parts]
-    by_rate, by_moment = (
-        by[[each == (name,) for each in reads]].sum(axis=0) for name in ("hub_rate", "root_moment")
-    )
+    is_of_rate = [part.signals == ("hub_rate",) for part in loop.law.parts]
+    is_of_moment = [part.signals == ("root_moment",) for part in loop.law.parts]
     turns = np.round(w * T / (2 * np.pi))
     origin = origins(loop)
     # poles from a mode's pole and its conjugate: two radii where both have become real
     conjugate = abs(pulse.poles - pulse.poles[upper].conj()[:, None]).argmin(axis=1)
-    radii = [
-        loop.poles.log_radius[np.isin(origin, pair)].max() for pair in zip(upper, conjugate, strict=True)
-    ]
+    log_radius = loop.poles.log_radius
+    radii = [log_radius[np.isin(origin, pair)].max() for pair in zip(upper, conjugate, strict=True)]
     return ModeTable(
         index=index,
         natural_frequency=w,
         band=np.floor(w * T / np.pi).astype(np.int64),
         aliased=abs(w - turns * 2 * np.pi / T),
-        by_rate=by_rate,
-        by_moment=by_moment,
-        by_others=by[[each not in (("hub_rate",), ("root_moment",)) for each in reads]].sum(axis=0),
+        by_rate=by[is_of_rate].sum(axis=0),
+        by_moment=by[is_of_moment].sum(axis=0),
+        by_others=by[~np.logical_or(is_of_rate, is_of_moment)].sum(axis=0),
         by_damping=own[upper],
         log_radius=np.array(radii),
     )
 
 
-def followed_branches(poles: Sequence[Complex], values: Real) -> Complex:
-    """The poles at each of the values, in any order, as branches (values, poles): each column is continuous.
+def follow_branches(poles: Sequence[Complex], values: Real) -> Complex:
+    """Return the poles at each of the values, in any order, as branches (values, poles): each column is continuous.
 
     The values must be close enough for branches to be distinguished.
     """
@@ -176,14 +173,14 @@ def followed_branches(poles: Sequence[Complex], values: Real) -> Complex:
         if len(rows) > 2:
             before, last, wanted = values[number - 2 : number + 1]
             ahead = ahead + (wanted - last) / (last - before) * (rows[-1] - rows[-2])
-        rows.append(z[_matched(ahead, z)])
+        rows.append(z[_match(ahead, z)])
     return np.array(rows)
 
 
 # four loops are kept: memory against time, of no effect on a result
 @lru_cache(maxsize=4)
 def origins(loop: Sampled) -> NDArray[np.int64]:
-    """For each closed-loop pole the open-loop pole where its branch begins, or -1.
+    """Return for each closed-loop pole the open-loop pole where its branch begins, or -1.
 
     These are numbered as in `PulseTransfer.poles`, those of the law after them.  A factor on the law grows from nearly
     0, and each pole is followed.
@@ -195,33 +192,31 @@ def origins(loop: Sampled) -> NDArray[np.int64]:
     # 1e-6 of the gains: there each pole is still at that of the plant
     scales = np.r_[1e-6, np.arange(1, following_steps) / following_steps, 1.0]
     first, *others = (loop.times(scale).eigenvalues for scale in scales[:-1].tolist())
-    poles = [first[_matched(open_loop[labels], first)], *others, loop.eigenvalues]
+    poles = [first[_match(open_loop[labels], first)], *others, loop.eigenvalues]
+    ends = follow_branches(poles, scales)[-1]
     origin = np.full(loop.eigenvalues.size, -1)
-    origin[_matched(followed_branches(poles, scales)[-1], loop.eigenvalues)] = labels
+    origin[_match(ends, loop.eigenvalues)] = labels
     origin.flags.writeable = False
     return origin
 
 
 def dominant(loop: Sampled) -> str:
-    """Origin of the pole with the largest radius: a mode, a pole of the law, or the hub (a filter, the delay).
+    """Return the origin of the pole of largest radius: a mode, a pole of the law, or the hub (a filter, the delay).
 
     A pole of the plant that rings and is assigned to no mode is an unassigned mode.
     """
     origin = int(origins(loop)[loop.poles.log_radius.argmax()])
     if origin >= loop.pulse.poles.size:
         return "a pole of the law"
-    mode, rings = (
-        (int(loop.pulse.mode[origin]), loop.pulse.poles[origin].imag != 0) if origin >= 0 else (0, False)
-    )
-    if mode:
-        return f"mode {mode}"
-    if rings:
+    if origin >= 0 and loop.pulse.mode[origin]:
+        return f"mode {loop.pulse.mode[origin]}"
+    if origin >= 0 and loop.pulse.poles[origin].imag:
         return "an unassigned mode"
     return "the hub"
 
 
-def _matched(ahead: Complex, z: Complex) -> NDArray[np.int64]:
-    """The poles in the order of the branches that they continue: the assignment of least total distance."""
+def _match(ahead: Complex, z: Complex) -> NDArray[np.int64]:
+    """Return the poles in the order of the branches that they continue: the assignment of least total distance."""
     _, order = linear_sum_assignment(abs(ahead[:, None] - z))
     return order
 
@@ -256,7 +251,7 @@ class SampledLoci:
         return 0.5 / self.loop.chain.sampling.period
 
     def is_aliased(self, mode: int) -> bool:
-        """Whether a flexible mode lies above half the sample rate."""
+        """Return whether a flexible mode lies above half the sample rate."""
         pulse = self.loop.pulse
         return bool((pulse.poles.imag[pulse.mode == mode] > 2 * np.pi * self.half_rate).any())
 
@@ -266,19 +261,19 @@ def sampled_loci(loop: Sampled, top: float, moments: tuple[float, float]) -> Sam
 
     That of the rate gain begins below the gain of the loop.
     """
-    # of the rate gain: below the end of its locus, and above its own value
-    rate_decades = 3
-    lowest = min(top / 10**rate_decades, loop.number(RATE_GAIN) / STRONGER)
-    values = np.geomspace(lowest, top, SAMPLED_LOCUS_VALUES), np.linspace(*moments, SAMPLED_LOCUS_VALUES)
-    return SampledLoci(
-        loop, {name: sampled_locus(loop, name, each) for name, each in zip(PLANE, values, strict=True)}
-    )
+    # three decades below the end of the locus
+    lowest = min(top / 1000, loop.number(RATE_GAIN) / STRONGER)
+    by = {
+        RATE_GAIN: np.geomspace(lowest, top, SAMPLED_LOCUS_VALUES),
+        MOMENT_GAIN: np.linspace(*moments, SAMPLED_LOCUS_VALUES),
+    }
+    return SampledLoci(loop, {name: sampled_locus(loop, name, values) for name, values in by.items()})
 
 
 def sampled_locus(loop: Sampled, gain: str, values: Real) -> SampledLocus:
     """Return the locus of a number at these values, at that of the loop, and between where a branch turns."""
 
-    def poles(value: float) -> Complex:
+    def poles_at(value: float) -> Complex:
         z = loop.having(gain, value).poles.z
         # 1e-12: imaginary part of a real z: rounding
         return np.where(abs(z.imag) <= 1e-12, z.real, z)
@@ -288,9 +283,9 @@ def sampled_locus(loop: Sampled, gain: str, values: Real) -> SampledLocus:
     wanted = np.union1d(values, own) if values[0] < own < values[-1] else values
     # 24 of halving the steps where a branch bends, at most
     for _ in range(24):
-        known |= {value: poles(value) for value in wanted.tolist() if value not in known}
+        known |= {value: poles_at(value) for value in wanted.tolist() if value not in known}
         values = np.array(sorted(known))
-        z = followed_branches([known[value] for value in values.tolist()], values)
+        z = follow_branches([known[value] for value in values.tolist()], values)
         bent = loose(np.where((z.imag >= 0) & (abs(z) < DRAWN_RADIUS), z, np.nan).T, 2 * RIM, 2 * RIM)
         if not bent.any():
             break

@@ -19,14 +19,10 @@ import numpy as np
 from tfarm.arm.chain import Chain
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing import Steps
-from tfarm.dsp.discretise import LawInZ, lowest_power, root_product
+from tfarm.dsp.discretise import LawInZ, lowest_power, root_product, root_product_error
 from tfarm.dsp.plant import Plant, PulseTransfer, SensedPlant, is_analog
 from tfarm.records import frozen
 
-# rad, of a pole: closer to it angles are not distinct
-NARROWEST_WIDTH = 1e-17
-# of the distance of a pole from the circle: the grid begins so near to it
-WIDTH_SHARE = 1e-2
 # poles and roots nearer to z = 0 have no narrow feature on the circle
 BRIGHT = 1e-2
 
@@ -78,7 +74,7 @@ class SampledRig:
         return circle_grid(self)
 
     def terms(self, z: Complex, base: Whole | None, offset: Any) -> Complex:
-        """Rows (1 + parts, n): offset q, and of each part offset times its sum of p_i H_i.
+        """Return rows (1 + parts, n): offset q, and of each part offset times its sum of p_i H_i.
 
         At z = e^{pT} + offset (n,), p the pole number `base`; of the law's poles, which are numbered after those of the
         plant, not times the offset.
@@ -102,35 +98,48 @@ class SampledRig:
             rows[1 + part] += gain * root_product(start, zeros, more) * measured[row]
         return rows
 
+    def rounding(self, weights: Real, base: Whole, offset: Complex) -> Real:
+        """Return the bound (n,) on the rounding error of weights @ terms at such points: of the sizes of all terms."""
+        start = self.open_loop[base]
+        is_of_law = base >= self.pulse.poles.size
+        scale = np.where(is_of_law, 1.0, offset)
+        sizes = self.pulse.sizes(np.where(is_of_law, -1, base), scale, start + offset)
+        error = abs(scale) * root_product_error(start, self.in_z.poles, offset)
+        for part, row, gain, zeros in self.in_z.terms:
+            error += abs(weights[1 + part] * gain) * root_product_error(start, zeros, offset) * sizes[row]
+        return error
+
     def near_one(self, weights: Real) -> list[tuple[int, float]]:
         """Return the rows of `terms` times weights (1 + parts,), as (n, c) of c x^n at small x = 1 - 1/z, without 0."""
-        plant = self.plant
-        T = self.chain.sampling.period
-        at_rest = self.plant.at_rest
-        size = abs(plant.static) + abs(plant.residues / plant.poles).sum(axis=1)
         found = [lowest_power(self.in_z.poles)] if weights[0] else []
-        slopes = self.pulse.slopes_at_one
         for part, row, gain, zeros in self.in_z.terms:
             weight = float(weights[1 + part] * gain)
-            if weight:
-                n, value = lowest_power(zeros)
-                rest = at_rest[row]
-                twice, once = plant.rigid[row]
-                if twice:
-                    own = (-2, twice * T * T)
-                elif once:
-                    own = (-1, once * T)
-                else:
-                    own = (0, rest)
-                # 1e-11 of its terms: a static gain that is 0, summed over 400 modes
-                if own[0] == 0 and abs(rest) <= 1e-11 * size[row]:
-                    own = (1, slopes[row])
-                found.append((n + own[0], float(own[1] * value * weight)))
+            if not weight:
+                continue
+            n, value = lowest_power(zeros)
+            power, own = self._signal_near_one(row)
+            found.append((n + power, float(own * value * weight)))
         return found
+
+    def _signal_near_one(self, row: int) -> tuple[int, float]:
+        """Return (n, c) of c x^n, the pulse transfer function to a signal at small x."""
+        plant = self.plant
+        T = self.chain.sampling.period
+        twice, once = plant.rigid[row]
+        if twice:
+            return -2, twice * T * T
+        if once:
+            return -1, once * T
+        rest = plant.at_rest[row]
+        size = abs(plant.static[row]) + abs(plant.residues[row] / plant.poles).sum()
+        # 1e-11 of its terms: a static gain that is 0, summed over 400 modes
+        if abs(rest) <= 1e-11 * size:
+            return 1, self.pulse.slopes_at_one[row]
+        return 0, rest
 
     @cached_property
     def frame(self) -> tuple[Real, Real]:
-        """The matrix without feedback, and what the input adds to its states."""
+        """The matrix without feedback, and the column of the input."""
         A, B, C = self.pulse.matrices()
         own, Bk, _, _ = self.in_z.matrices
         return np.block([[A, np.zeros((len(A), len(own)))], [Bk @ C, own]]), np.r_[B, np.zeros(len(own))]
@@ -160,14 +169,17 @@ class CircleGrid:
         return self.at(self.base, self.shift)
 
     def steps(self, number: Whole) -> Steps:
-        """The steps from the points of these numbers to the next, as angles from the pole of each."""
+        """Return the steps from the points of these numbers to the next, as angles from the pole of each."""
         # where the next point has another pole, both are as far away
         base = self.base[number]
+        angles = self.angles[base]
         is_own = base == self.base[number + 1]
-        high = np.where(is_own, self.shift[number + 1], self.q[number + 1] - self.angles[base])
-        return Steps(
-            self.shift[number], high, lambda shift, which: self.at(base[which], shift), self.angles[base]
-        )
+        high = np.where(is_own, self.shift[number + 1], self.q[number + 1] - angles)
+
+        def terms_at(shift: Real, which: Whole) -> Complex:
+            return self.at(base[which], shift)
+
+        return Steps(self.shift[number], high, terms_at, angles)
 
     def at(self, base: Whole, shift: Real) -> Complex:
         """Return the rig's `terms` at other points."""
@@ -178,7 +190,7 @@ class CircleGrid:
 
 
 def circle_grid(rig: SampledRig) -> CircleGrid:
-    """The grid that resolves every pole of the plant and every pole and zero of the law, for any weights."""
+    """Return the grid that resolves every pole of the plant and every pole and zero of the law, for any weights."""
     pulse = rig.pulse
     angles = np.angle(pulse.multipliers)
     bases = np.nonzero((angles >= 0) & (abs(pulse.multipliers) > BRIGHT))[0]
@@ -187,12 +199,12 @@ def circle_grid(rig: SampledRig) -> CircleGrid:
     base = []
     shift = []
     for pole, low, high in zip(bases, seams[:-1], seams[1:], strict=True):
-        width = max(abs(pulse.poles.real[pole]) * pulse.sampling.period * WIDTH_SHARE, NARROWEST_WIDTH)
+        away = abs(pulse.poles.real[pole]) * pulse.sampling.period
         for edge in (low - angles[pole], high - angles[pole]):
-            shift.append(geometric(abs(edge), width) * np.sign(edge))
+            shift.append(geometric(abs(edge), away) * np.sign(edge))
             base.append(np.full(shift[-1].size, pole))
-    near = [*_next_to_roots(1 + np.concatenate([rig.in_z.poles, *(zeros for *_, zeros in rig.in_z.columns)]))]
-    extra = np.unique(np.concatenate([np.empty(0), *near]))
+    roots = np.concatenate([rig.in_z.poles, *(zeros for *_, zeros in rig.in_z.columns)])
+    extra = np.unique(np.concatenate([np.empty(0), *_angles_near(1 + roots)]))
     base.append(bases[np.searchsorted(seams[1:-1], extra)])
     shift.append(extra - angles[base[-1]])
     whole = CircleGrid(rig, np.concatenate(base), np.concatenate(shift))
@@ -206,23 +218,25 @@ def circle_grid(rig: SampledRig) -> CircleGrid:
     return CircleGrid(rig, whole.base[inside], whole.shift[inside])
 
 
-def _next_to_roots(roots: Complex) -> Iterator[Real]:
-    """Angles on the upper half of the circle at geometric distances from some roots."""
+def _angles_near(roots: Complex) -> Iterator[Real]:
+    """Yield angles on the upper half of the circle at geometric distances from some roots."""
     # the upper of each pair
     for root in roots[(abs(roots) > BRIGHT) & (roots.imag >= 0)]:
-        near = geometric(math.pi, max(WIDTH_SHARE * abs(1 - abs(root)), NARROWEST_WIDTH))
+        near = geometric(math.pi, abs(1 - abs(root)))
         q = abs(np.angle(root)) + np.r_[-near, near]
         yield q[(q > 0) & (q < math.pi)]
 
 
-def geometric(edge: float, width: float, a_decade: int = 48, uniform: int = 2000) -> Real:
-    """Distances from a pole, from a hundredth of its width to the seam with its neighbour.
+def geometric(edge: float, away: float) -> Real:
+    """Return angles from a pole, from a hundredth of its distance from the circle to the seam with its neighbour.
 
-    There are 48 points a decade of the distance, and those of a uniform grid of 2000 points over the half circle.
+    There are 48 points a decade, and those of a uniform grid of 2000 points over the half circle.
     """
-    if edge <= width:
+    # 1e-17 rad: closer to a pole angles are not distinct
+    nearest = max(1e-2 * away, 1e-17)
+    if edge <= nearest:
         return np.array([edge / 2])[: int(edge > 0)]
-    decades = np.log10(edge / width)
-    near = np.geomspace(width, edge, max(2, int(a_decade * decades)), endpoint=False)
-    even = np.arange(1, int(edge * uniform / np.pi) + 1) * (np.pi / uniform)
+    decades = np.log10(edge / nearest)
+    near = np.geomspace(nearest, edge, max(2, int(48 * decades)), endpoint=False)
+    even = np.arange(1, int(edge * 2000 / np.pi) + 1) * (np.pi / 2000)
     return np.union1d(near, even[even < edge])

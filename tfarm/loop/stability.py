@@ -12,27 +12,21 @@ Poles are computed, completely, up to a band; what lies beyond is known by
 
 Else it is not determined, and the verdict is that of the band.  A pole at 0 remains where the hub angle is free:
 verdicts leave it out.
-
-Spillover: a law is designed on a model of a few modes, and may destabilise a mode of the rig that the model omits
-(Balas 1978).  The verdict of the exact loop, which has all modes, is compared with those of ever larger models.
 """
 
 import math
 import warnings
 from collections.abc import Iterable
 from functools import cached_property
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tfarm.arm import MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm
-from tfarm.arm.blocks import Matrices
-from tfarm.arm.checks import whole
+from tfarm.arm import MOMENT_GAIN, RATE_GAIN, Arm
 from tfarm.arm.stages import Consumer
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import Real
 from tfarm.case import Case
-from tfarm.errors import ConvergenceError, ParameterError, require
+from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.loop.continuous import (
     MOST_BAND_MODES,
     QUIET_REACH,
@@ -50,11 +44,9 @@ from tfarm.loop.poles import (
     count_with_mirrors,
     poles_below,
     poles_by_mode,
-    poles_of_model,
 )
-from tfarm.loop.theorem import GIVES, TAKES
+from tfarm.loop.theorem import Energy
 from tfarm.records import frozen
-from tfarm.reduced.modal import modal_model, sensed_model
 from tfarm.response.frequency import AXIS_SHARE
 from tfarm.schema import Quantity
 from tfarm.spectrum import flexible_frequencies, modes, modes_below
@@ -63,12 +55,6 @@ from tfarm.spectrum import flexible_frequencies, modes, modes_below
 QUIET = 0.5
 # a real part below this share of |s| is none: poles have an error of a few eps
 MARGIN_OF_ZERO = 1e-11
-# of the largest model by default
-USUAL_SPILL_MODES = 20
-# of its size: largest real part of a pole that no model damps
-UNDAMPED_SHARE = 1e-9
-
-
 CONTINUOUS = Consumer(
     "continuous-time column",
     acts=("law", "hold", "hub damping", "plant"),
@@ -87,20 +73,7 @@ CONTINUOUS = Consumer(
         "volts",
     ),
 )
-FIRST_MODE = Quantity("lowest destabilised mode", help="of the exact loop; 0: a pole below the first mode")
-SHOWN_FROM = Quantity(
-    "design models unstable from (modes)", key="shown_from_modes", help="as are all larger ones"
-)
-DELAYED = "a delay without any damping destabilises infinitely many modes"
 SMALL_GAIN = f"|L(iw)| < {QUIET:g} and falling: no unstable pole (small gain)"
-BAND = Quantity(
-    "frequency range, up to", "rad/s", key="up_to_rad_s", help="poles below it are counted completely"
-)
-KNOWN_BEYOND = Quantity(
-    "stability known beyond the range",
-    key="known_beyond",
-    help="no: the verdict is that of the frequency range alone",
-)
 
 
 @frozen
@@ -121,12 +94,24 @@ class Stability(LoopVerdict):
     unstable_roots_infinite: Annotated[
         bool, Quantity(help="infinitely many poles beyond the range are unstable")
     ]
-    band: Annotated[float, BAND]
+    band: Annotated[
+        float,
+        Quantity(
+            "frequency range, up to", "rad/s", key="up_to_rad_s", help="poles below it are counted completely"
+        ),
+    ]
     tail: Annotated[
         str, Quantity("beyond the range", key="beyond", help="what decides the poles of higher frequency")
     ]
     poles: Poles
-    is_known_beyond: Annotated[bool, KNOWN_BEYOND] = True
+    is_known_beyond: Annotated[
+        bool,
+        Quantity(
+            "stability known beyond the range",
+            key="known_beyond",
+            help="no: the verdict is that of the frequency range alone",
+        ),
+    ] = True
 
     consumer = CONTINUOUS
 
@@ -164,7 +149,7 @@ class Stability(LoopVerdict):
 
     @property
     def range_words(self) -> str:
-        """The range in which poles are counted, and what is known beyond."""
+        """The range in which poles are counted, and certainty beyond."""
         if self.tail == SMALL_GAIN:
             known = ", small gain beyond"
         elif self.is_known_beyond:
@@ -182,10 +167,10 @@ class Stability(LoopVerdict):
     def oscillating_poles(self) -> list[tuple[int, complex]]:
         """The oscillating poles by mode."""
         moving = self.poles.moving
-        table = modes(self.loop.arm, up_to=self.band)
-        own = dict(zip(table.index.tolist(), (1j * table.natural_frequency).tolist(), strict=True))
         oscillating = moving[moving.imag > 0]
-        by_mode = poles_by_mode(oscillating, {n: s for n, s in own.items() if n})
+        table = modes(self.loop.arm, up_to=self.band)
+        own = zip(table.index.tolist(), (1j * table.natural_frequency).tolist(), strict=True)
+        by_mode = poles_by_mode(oscillating, {n: s for n, s in own if n})
         others = oscillating[~np.isin(oscillating, list(by_mode.values()))]
         return [*by_mode.items(), *((HUB, s) for s in others.tolist())]
 
@@ -221,16 +206,20 @@ class Stability(LoopVerdict):
         # points around a pole of the law, in its distances from the axis
         near = (ringing.imag[:, None] + abs(ringing.real)[:, None] * np.linspace(-4.0, 4.0, 41)).ravel()
         corner = complex(self.poles.box.re_max, band)
-        edges = np.linspace(1j * band, corner, 750)[1:], np.linspace(corner, corner.real, 750)[1:]
+        top = np.linspace(1j * band, corner, 750)
+        right = np.linspace(corner, corner.real, 750)
+        is_right = own.real > AXIS_SHARE * abs(own)
+        is_in_band = abs(own.imag) < band
+        least = AXIS_SHARE * abs(moving)
         return LoopContour(
             grid=np.r_[omega, near[near > omega[0]]],
             on_curve=poles_on_axis(loop, band),
             closed=moving,
-            closing=np.concatenate(edges),
-            unstable_open=int(((own.real > AXIS_SHARE * abs(own)) & (abs(own.imag) < band)).sum()),
+            closing=np.r_[top[1:], right[1:]],
+            unstable_open=int((is_right & is_in_band).sum()),
             unstable=self.unstable_roots,
-            clear=count_with_mirrors(moving[moving.real > AXIS_SHARE * abs(moving)]),
-            near_axis=count_with_mirrors(moving[abs(moving.real) <= AXIS_SHARE * abs(moving)]),
+            clear=count_with_mirrors(moving[moving.real > least]),
+            near_axis=count_with_mirrors(moving[abs(moving.real) <= least]),
         )
 
     def gain_limits(self, by_phase: tuple[PhaseCrossover, ...]) -> tuple[float, float]:
@@ -239,18 +228,20 @@ class Stability(LoopVerdict):
         Without damping all modes may reach it at one factor, where rounding alone decides whether L < 0.  There the
         factor follows from a theorem.
         """
-        if not self.loop.is_moved_at_hub_alone or self.loop.theorem.energy is None:
+        loop = self.loop
+        if not loop.is_moved_at_hub_alone or loop.theorem.energy is None:
             return next_limits(t for _, t in by_phase)
-        arm = self.loop.arm
-        numbers = self.loop.numbers
-        ends = (arm.input_per_torque, numbers[MOMENT_GAIN]), (-arm.rate_loss, numbers[RATE_GAIN])
-        return next_limits(
-            [*(t for w, t in by_phase if w == 0), *(end / gain for end, gain in ends if end and gain)]
-        )
+        limits = [t for w, t in by_phase if w == 0]
+        ends = {MOMENT_GAIN: loop.arm.input_per_torque, RATE_GAIN: -loop.arm.rate_loss}
+        for name, end in ends.items():
+            gain = loop.numbers[name]
+            if end and gain:
+                limits.append(end / gain)
+        return next_limits(limits)
 
 
 def poles_on_axis(loop: ContinuousLoop, band: float) -> Real:
-    """Poles of L on the imaginary axis [rad/s], from 0 up: of the rigid body and the law, and at C = 0 of all modes."""
+    """Return poles of L on the imaginary axis [rad/s], ascending: of rigid body, law, and at C = 0 all modes."""
     arm = loop.arm
     flexible = np.asarray(flexible_frequencies(arm, band)) if arm.is_undamped else np.empty(0)
     own = loop.law.poles
@@ -274,27 +265,27 @@ def verdict_on(loop: ContinuousLoop, band: float | None = None) -> Stability:
     """Return the verdict on a loop, as `stability`."""
     # of 1/delay: poles are listed up to there on the left; further left are more and more, all stable
     listed_left = 0.5
-    unknown_above = (
-        "converged up to {band:.4g} rad/s, not determined beyond, neither by small gain nor by a theorem"
-    )
     theorem = loop.theorem
-    height, quiet = (band, False) if band is not None else band_of_loop(loop)
+    height, is_small = (band, False) if band is not None else band_of_loop(loop)
     poles = poles_below(loop, height, listed_left)
-    delayed = DELAYED if loop.arm.is_undamped and loop.law.delay and loop.feeds_back else ""
+    is_known = True
+    is_infinite = theorem.energy == Energy.SUPPLY
     if theorem.energy is not None:
         tail = theorem.reason
-    elif quiet:
+    elif is_small:
         tail = SMALL_GAIN
+    elif loop.arm.is_undamped and loop.law.delay and loop.feeds_back:
+        tail = "a delay without any damping destabilises infinitely many modes"
+        is_infinite = True
     else:
-        tail = delayed
-    is_infinite = theorem.energy == GIVES or tail == DELAYED
-    verdict = _verdict(poles, is_infinite)
-    words = tail or unknown_above.format(band=height)
-    return Stability(loop, verdict, poles.unstable, is_infinite, poles.box.im_max, words, poles, bool(tail))
+        tail = f"converged up to {height:.4g} rad/s, not determined beyond, neither by small gain nor by a theorem"
+        is_known = False
+    word = _word_of(poles, is_infinite)
+    return Stability(loop, word, poles.unstable, is_infinite, poles.box.im_max, tail, poles, is_known)
 
 
-def _verdict(poles: Poles, is_infinite: bool) -> str:
-    """The verdict from the poles of the band, and from the theorem where rounding hides the side of the axis.
+def _word_of(poles: Poles, is_infinite: bool) -> str:
+    """Return the verdict from the poles of the band, and from the theorem where rounding hides the side of the axis.
 
     Raises ConvergenceError where one of a damped loop may be on the axis, and none is right of it.
     """
@@ -307,20 +298,19 @@ def _verdict(poles: Poles, is_infinite: bool) -> str:
         return "marginal"
     on_axis = moving[share > -MARGIN_OF_ZERO]
     if arm.loses_at_hub_alone:
-        known = poles.loop.theorem.energy == TAKES or not on_axis.size
+        known = poles.loop.theorem.energy == Energy.LOSS or not on_axis.size
         if known and is_controllable(arm.lossless_hub, poles.box.im_max):
             return "stable"
         return "marginal"
     if on_axis.size:
-        text = (
-            f"the pole at {on_axis[0]:.6g} 1/s is on the imaginary axis to working precision: not determined"
-        )
-        raise ConvergenceError(text, complex(on_axis[0]), float(on_axis[0].real))
+        pole = complex(on_axis[0])
+        text = f"the pole at {pole:.6g} 1/s is on the imaginary axis to working precision: not determined"
+        raise ConvergenceError(text, pole, pole.real)
     return "stable"
 
 
 def is_controllable(arm: Arm, up_to: float) -> bool:
-    """Whether the hub takes part in every flexible mode below `up_to` [rad/s], by rotation or by root moment.
+    """Return whether the hub takes part in every flexible mode below `up_to` [rad/s], by rotation or by root moment.
 
     At C = 0 a mode without the hub stays undamped under any law: exceptional arms have one.
     """
@@ -330,7 +320,7 @@ def is_controllable(arm: Arm, up_to: float) -> bool:
 
 
 def hub_shares(arm: Arm, up_to: float) -> Real:
-    """Rotation and root moment at the hub (2, modes) of the flexible modes below `up_to` [rad/s], as shares.
+    """Return rotation and root moment at the hub (2, modes) of the flexible modes below `up_to` [rad/s], as shares.
 
     Of sqrt(1/m) k and sqrt(1/m) E I k^2, those of a slender beam of mass m with waves of the same frequency: high modes
     tend to sqrt 2 and 0 on a free pin, to 0 and 2 where the hub is heavy.
@@ -346,7 +336,7 @@ def hub_shares(arm: Arm, up_to: float) -> Real:
 
 
 def band_of_loop(loop: ContinuousLoop) -> tuple[float, bool]:
-    """The band [rad/s] in which poles are computed, and whether small gain holds beyond it (never without damping)."""
+    """Return the band [rad/s] of computed poles, and whether small gain holds beyond it (never without damping)."""
     # flexible modes in the band at C = 0, and at least
     least_band_modes = 12
     # times, from one band that is tried to the next
@@ -374,13 +364,13 @@ def band_of_loop(loop: ContinuousLoop) -> tuple[float, bool]:
 
 
 def band_of_family(loops: Iterable[ContinuousLoop]) -> tuple[float, bool]:
-    """A band [rad/s] for all these loops, and whether small gain holds beyond it for all."""
-    bands, quiet = zip(*map(band_of_loop, loops), strict=True)
-    return max(bands), all(quiet)
+    """Return a band [rad/s] for all these loops, and whether small gain holds beyond it for all."""
+    bands, are_small = zip(*map(band_of_loop, loops), strict=True)
+    return max(bands), all(are_small)
 
 
 def is_quiet(loop: ContinuousLoop, band: float) -> bool:
-    """Whether small gain decides every pole beyond a band.
+    """Return whether small gain decides every pole beyond a band.
 
     Not determined for a rig with an elastic segment: its resonances become ever narrower, and pass between any points
     at which L is evaluated.
@@ -389,7 +379,7 @@ def is_quiet(loop: ContinuousLoop, band: float) -> bool:
 
 
 def has_fallen(loop: ContinuousLoop, band: float) -> bool:
-    """Whether 1 + L has no zero with Im s > band right of the axis, by |L| < 1/2 on the edges of that region.
+    """Return whether 1 + L has no zero with Im s > band right of the axis, by |L| < 1/2 on the edges of that region.
 
     L is evaluated on two decades of the axis, where |L| falls, with the natural frequencies between, and on the upper
     edge of the box; farther right |L| is smaller still.
@@ -401,7 +391,8 @@ def has_fallen(loop: ContinuousLoop, band: float) -> bool:
     omega = np.asarray(quiet_places(loop.arm, band, quiet_points))
     half = math.sqrt(QUIET_REACH) * band
     size = abs(loop.loop_function(1j * omega))
-    if not (size.max() < QUIET and size[omega > half].max() <= size[omega <= half].max()):
+    is_falling = size[omega > half].max() <= size[omega <= half].max()
+    if size.max() >= QUIET or not is_falling:
         return False
     right = box_of(loop, band).re_max
     edge = np.r_[0.0, np.geomspace(nearest_to_axis * band, right, quiet_points // 4)] + 1j * band
@@ -409,155 +400,13 @@ def has_fallen(loop: ContinuousLoop, band: float) -> bool:
 
 
 def is_known_without(loop: ContinuousLoop, name: str) -> bool:
-    """Whether poles beyond some band are known of this law, and of any nearer to it, once a leading coefficient is 0.
+    """Return whether poles beyond some band are known of this law, and of any nearer, once a leading coefficient is 0.
 
     Else high modes become unstable as it goes to 0, and their poles come to a band from above: the counts on one side
     of 0 do not follow from those on the other.
     """
     try:
         without = loop.having(name, 0.0)
-        return without.theorem.energy in (TAKES, 0) or band_of_loop(without)[1]
+        return without.theorem.energy in (Energy.LOSS, Energy.CONSTANT) or band_of_loop(without)[1]
     except (ParameterError, ConvergenceError):
         return False
-
-
-# ------------------------------------------------------------ spillover
-
-
-class SpillModel(NamedTuple):
-    """A design model under the law: flexible modes, unstable poles, rightmost pole."""
-
-    modes: Annotated[int, Quantity("modes", help="flexible modes of the design model")]
-    unstable: Annotated[int, Quantity("unstable poles", help="of the design model under the controller")]
-    rightmost: Annotated[complex, Quantity("rightmost pole", "1/s", help="apart from poles at 0")]
-
-
-@frozen
-class Spill:
-    """The verdict on the exact loop, and models of `modes` (n,) flexible modes: `unstable` (n,) and `rightmost` (n,).
-
-    `rightmost` [1/s] is the rightmost pole of each, apart from those at 0.  `driven` [1/s] are the exact loop's
-    unstable poles with Im >= 0.  `first_mode` is the flexible mode whose frequency is next to the lowest of those, 0
-    where that is real or below half the first.  From `shown_from` modes on every model is unstable too; None where the
-    last is not.
-    """
-
-    verdict: Annotated[Stability, Quantity(flat=True)]
-    modes: NDArray[np.int64]
-    unstable: NDArray[np.int64]
-    rightmost: Complex
-
-    @property
-    def driven(self) -> Annotated[Complex, Quantity("s", "1/s", help="unstable poles of the exact loop")]:
-        """The exact loop's unstable poles, ascending in Im s."""
-        moving = self.verdict.poles.moving
-        return moving[moving.real > UNDAMPED_SHARE * abs(moving)]
-
-    @property
-    def first_mode(self) -> Annotated[int | None, FIRST_MODE]:
-        """The lowest destabilised mode; None where the exact loop is stable in its band."""
-        if not self.driven.size:
-            return None
-        lowest = float(self.driven[0].imag)
-        table = modes(self.verdict.loop.arm, up_to=2.0 * max(lowest, 1.0) + self.verdict.band)
-        flexible = table.natural_frequency[table.index > 0]
-        if lowest < flexible[0] / 2:
-            return 0
-        return int(np.argmin(abs(flexible - lowest))) + 1
-
-    @property
-    def shown_from(self) -> Annotated[int | None, SHOWN_FROM]:
-        """Number of modes from which on the models are unstable too."""
-        beyond = self.modes[self.modes > self.content.max(initial=0)]
-        return int(beyond[0]) if beyond.size else None
-
-    @property
-    def models(
-        self,
-    ) -> Annotated[list[SpillModel], Quantity("design models", help="bare modes, without remainder")]:
-        """One row for each model."""
-        poles = (complex(s.real, abs(s.imag)) for s in self.rightmost)
-        return list(map(SpillModel, self.modes.tolist(), self.unstable.tolist(), poles))
-
-    @property
-    def content(self) -> NDArray[np.int64]:
-        """The numbers of modes of the models that are stable."""
-        return self.modes[self.unstable == 0]
-
-    @property
-    def in_words(
-        self,
-    ) -> Annotated[str, Quantity("spillover", help="exact loop, compared with the design models")]:
-        """The exact loop, and the models that are stable where it is not."""
-        if not self.driven.size:
-            where = "" if self.verdict.is_known_beyond else " in the frequency range"
-            return f"none: the exact loop is {self.verdict.word}{where}"
-        which = f"mode {self.first_mode}" if self.first_mode else "a pole below the first mode"
-        words = f"{which} is unstable in the exact loop, at {abs(self.driven[0]):.6g} rad/s"
-        if not self.content.size:
-            return f"{words}, and every model is unstable"
-        first, last = self.content[[0, -1]].tolist()
-        count = self.content.size
-        models = f"models of {first} to {last} modes are"
-        if count == 1:
-            models = f"the model of {first} mode{'s' * (first > 1)} is"
-        elif last - first + 1 != count:
-            models = f"{count} of the models up to {last} modes are"
-        if self.shown_from:
-            end = f"those from {self.shown_from} modes on are not"
-        else:
-            end = "the largest among them"
-        return f"{words}; {models} stable, {end}"
-
-
-def spill(arm: Arm, law: AnyLaw, most: int = USUAL_SPILL_MODES) -> Spill:
-    """Return the verdict on the exact loop, and models of 1 to `most` flexible modes without their static remainder.
-
-    Such models are used for design: bare modes.  A delay is in them as a Pade approximation.
-    Raises ParameterError for an invalid law, where there is no loop, or none of finite order; ConvergenceError as
-    `stability` does.
-    """
-    # modes of a model
-    most_spill_modes = 60
-    # of w1: poles at 0 come out as small
-    rest_share = 1e-7
-    case = Case(arm, law)
-    most = whole("modes", most, 1, most_spill_modes, f"a whole number of modes, 1 to {most_spill_modes}")
-    require(
-        not case.law.is_improper,
-        "law",
-        case.law.name,
-        "differentiates, and has no states; add a fast pole to den",
-    )
-    verdict = stability(case)
-    loop = verdict.loop
-    numbers = np.arange(1, most + 1)
-    unstable = []
-    rightmost = []
-    slowest = rest_share * float(modes(loop.arm, 1).natural_frequency[-1])
-    for model in _bare_models(loop, most):
-        poles = poles_of_model(loop, model)
-        moving = poles[abs(poles) > slowest]
-        unstable.append(int((moving.real > UNDAMPED_SHARE * abs(moving)).sum()))
-        rightmost.append(moving[np.argmax(moving.real)])
-    return Spill(verdict, numbers, np.array(unstable), np.array(rightmost))
-
-
-def _bare_models(loop: ContinuousLoop, most: int) -> list[Matrices]:
-    """Models of 1 to `most` flexible modes without static remainder, each with the poles of its modes alone.
-
-    They are cut from the largest.  A search of more modes of a strongly damped arm may leave poles without a mode,
-    which no smaller model has: then each has a search of its own.
-    """
-    arm = loop.arm
-    signals = loop.law.signals
-    numbers = range(1, most + 1)
-    first, last = (modal_model(arm, "hub_angle", number) for number in (1, most))
-    if last.index.tolist() == [*numbers] and last.single.size == first.single.size:
-        A, B, C, D = sensed_model(arm, signals, most)
-        states = np.arange(len(A))
-        beyond = [last.rigid_states + 2 * number for number in numbers]
-        kept = [(states < end) | (states >= beyond[-1]) for end in beyond]
-        return [(A[np.ix_(each, each)], B[each], C[:, each], 0 * D) for each in kept]
-    models = [sensed_model(arm, signals, number) for number in numbers]
-    return [(A, B, C, 0 * D) for A, B, C, D in models]

@@ -40,6 +40,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from enum import IntEnum
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -55,11 +56,13 @@ if TYPE_CHECKING:
     # of sympy, over the rationals: it comes without types, and is imported where it is used
     Poly = Any
 
-KIND = Quantity("kind", help="from the hub's angle or rate to its torque; none where no sign is shown")
-# energy that a law takes from every mode with motion of the hub: its sign
-TAKES = 1
-CONSERVES = 0
-GIVES = -1
+
+class Energy(IntEnum):
+    """Effect of a law on the energy of every mode with motion of the hub."""
+
+    LOSS = 1
+    CONSTANT = 0
+    SUPPLY = -1
 
 
 @frozen
@@ -67,27 +70,27 @@ class Signs:
     """The `kind` of a law in s on hub angle and hub rate, and the `reason`.
 
     "strictly passive": Re of the law on the rate is above 0 at all frequencies; "passive": nowhere below;
-    "negative imaginary": -C strictly so on the angle; "" where none of these is shown.  `energy` of each mode: the law
-    TAKES, CONSERVES or GIVES it; None where that is not shown.
+    "negative imaginary": -C strictly so on the angle; "" where none of these is shown.  `energy` is None
+    where the effect on it is not shown.
     """
 
-    kind: Annotated[Literal["strictly passive", "passive", "negative imaginary", ""], KIND]
+    kind: Annotated[
+        Literal["strictly passive", "passive", "negative imaginary", ""],
+        Quantity("kind", help="from the hub's angle or rate to its torque; none where no sign is shown"),
+    ]
     reason: Annotated[str, Quantity("reason", help="property of the controller that decides the kind")]
-    energy: int | None = None
+    energy: Energy | None = None
 
 
 class Theorem(NamedTuple):
     """Effect of a law on the `energy` of every mode of a loop by a theorem, None without one, and the `reason`."""
 
-    energy: int | None
-    reason: str
-
-
-NO_THEOREM = Theorem(None, "")
+    energy: Energy | None = None
+    reason: str = ""
 
 
 def cancel_hub_moment(loop: Loop) -> tuple[float, Law] | None:
-    """The share k of the moment on the hub that a law cancels, and the rest of the law.
+    """Return the share k of the moment on the hub that a law cancels, and the rest of the law.
 
     None for laws on other signals than the hub's angle and rate and, statically, the moment that acts on the hub.  With
     damping in the links that moment is not the gauge's.
@@ -112,34 +115,34 @@ def cancel_hub_moment(loop: Loop) -> tuple[float, Law] | None:
 
 def theorem_of(loop: Loop) -> Theorem:
     """Return the theorem that decides the stability of every mode of a loop."""
-    held = (
-        "modes with the hub at rest stay undamped at all frequencies: the whole moment on the hub is fed back"
-    )
-    conserved = "C = 0 and energy is conserved: modes beyond lie on the axis"
-    damped = "C = 0: every mode beyond is damped (Lyapunov), with a decay rate that tends to 0"
-    driven = "C = 0: every flexible mode beyond is unstable too, with a growth rate that tends to 0"
     arm = loop.arm
     parts = cancel_hub_moment(loop)
     if parts is None or (arm.input_lags and loop.feeds_back):
-        return NO_THEOREM
+        return Theorem()
     share, rest = parts
     if share == 1.0:
-        return Theorem(CONSERVES, held)
+        words = "modes with the hub at rest stay undamped at all frequencies: the whole moment on the hub is fed back"
+        return Theorem(Energy.CONSTANT, words)
     way = 1.0 if share < 1.0 else -1.0
     signs = signs_of(rest.times(way), way * arm.rate_loss)
     if signs.energy is not None:
-        is_plain = arm.has_elastic_link and loop.law.is_static
-        words = f"{signs.reason}: no mode is unstable at any frequency"
-        return Theorem(signs.energy, (damped if signs.energy else conserved) if is_plain else words)
+        if not arm.has_elastic_link or not loop.law.is_static:
+            words = f"{signs.reason}: no mode is unstable at any frequency"
+        elif signs.energy == Energy.CONSTANT:
+            words = "C = 0 and energy is conserved: modes beyond lie on the axis"
+        else:
+            words = "C = 0: every mode beyond is damped (Lyapunov), with a decay rate that tends to 0"
+        return Theorem(signs.energy, words)
     if arm.has_elastic_link and arm.loses_at_hub_alone:
         opposite = signs_of(rest.times(-way), -way * arm.rate_loss)
-        if opposite.energy == TAKES:
-            return Theorem(GIVES, driven)
-    return NO_THEOREM
+        if opposite.energy == Energy.LOSS:
+            words = "C = 0: every flexible mode beyond is unstable too, with a growth rate that tends to 0"
+            return Theorem(Energy.SUPPLY, words)
+    return Theorem()
 
 
 def signs_of_loop(loop: Loop) -> Signs:
-    """The sign of the law of a loop, the hub's friction included; none behind an inductance."""
+    """Return the sign of the law of a loop, the hub's friction included; none behind an inductance."""
     if loop.arm.input_lags:
         return Signs("", "the torque lags behind the input, through an inductance")
     return signs_of(loop.law, loop.arm.rate_loss)
@@ -149,13 +152,12 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
     """Return the sign of a law, the hub's friction [input per rad/s] included."""
     # degree: exact arithmetic with such polynomials takes a moment
     most_exact_degree = 40
+    has_matrices = not all(isinstance(part.block, Rational) for part in law.parts)
+    reads_other = not set(law.signals) <= {"hub_angle", "hub_rate"}
     obstacles = {
         "a delay turns the phase with frequency": law.delay,
-        "it is not a law in s on the hub's own angle or rate alone": law.is_discrete
-        or not set(law.signals) <= {"hub_angle", "hub_rate"},
-        "the sign of matrices is not determined: give transfer functions": not all(
-            isinstance(part.block, Rational) for part in law.parts
-        ),
+        "it is not a law in s on the hub's own angle or rate alone": law.is_discrete or reads_other,
+        "the sign of matrices is not determined: give transfer functions": has_matrices,
         f"the sign of more than {most_exact_degree} states is not determined": law.order > most_exact_degree,
     }
     if reason := next((text for text, holds in obstacles.items() if holds), ""):
@@ -181,34 +183,36 @@ def signs_of(law: Law, friction: float = 0.0) -> Signs:
         return passive
     if is_hurwitz(den) and num.degree() <= den.degree() and definite(on_axis(num, den)[1]) == "above":
         words = "the law on the hub's angle, with its sign changed, is strictly negative imaginary"
-        return Signs("negative imaginary", words, TAKES)
+        return Signs("negative imaginary", words, Energy.LOSS)
     return passive or Signs("", "neither passive nor negative imaginary")
 
 
 def _of_signs(rate: float, at_rest: float) -> Signs:
-    """The signs of a law without poles right of the axis, by that of Re on the rate and by its value at rest."""
+    """Return the signs of a law without poles right of the axis, by that of Re on the rate and by its value at rest."""
     if rate > 0 and at_rest >= 0:
         words = "the law on the hub's rate dissipates energy at every frequency (strictly positive real)"
-        return Signs("strictly passive", words, TAKES)
+        return Signs("strictly passive", words, Energy.LOSS)
     if rate == 0 and at_rest >= 0:
         words = "the law on the hub's rate supplies energy at no frequency (positive real)"
-        return Signs("passive", words, CONSERVES)
+        return Signs("passive", words, Energy.CONSTANT)
     if rate < 0:
         return Signs("", "neither passive nor negative imaginary")
     # Re > 0 on the whole axis but 0: a pole crosses that at s = 0 alone, and only real poles are unstable
-    return Signs("", "the static stiffness of the law is negative", TAKES if rate else CONSERVES)
+    effect = Energy.LOSS if rate else Energy.CONSTANT
+    return Signs("", "the static stiffness of the law is negative", effect)
 
 
 def _positive_real(num: Poly, den: Poly) -> Signs | None:
-    """Signs of C(s)/s, the law on the rate, if it is positive real, or has Re > 0 on the whole axis but 0; else None.
+    """Return signs of C(s)/s, the law on the rate, if positive real, or Re > 0 on the whole axis but 0; else None.
 
     It is if Re >= 0 on the axis, no pole lies right of it, and those on it are simple with a residue above 0: of these
     one at 0 alone is allowed, C(0) of a law on the angle.
     """
-    at_rest = num.eval(0) / den.eval(0) if den.eval(0) else None
-    if at_rest is None or not is_hurwitz(den):
+    if not den.eval(0) or not is_hurwitz(den):
         return None
-    if num.degree() > den.degree() + 2 or (num.degree() == den.degree() + 2 and num.LC() / den.LC() < 0):
+    at_rest = num.eval(0) / den.eval(0)
+    excess = num.degree() - den.degree()
+    if excess > 2 or (excess == 2 and num.LC() / den.LC() < 0):
         return None
     # Re C(i w)/(i w) = Im C(i w)/w
     sign = definite(on_axis(num, den)[1])
@@ -279,44 +283,45 @@ def lyapunov(loop: Loop) -> Lyapunov:
 
 
 def exact_polynomial(coefficients: Sequence[float]) -> Poly:
-    """The polynomial in w with these doubles as coefficients, descending, exact."""
+    """Return the polynomial in w with these doubles as coefficients, descending, exact."""
     from sympy import QQ, Poly, Rational, Symbol
 
     return Poly([Rational(*float(each).as_integer_ratio()) for each in coefficients], Symbol("w"), domain=QQ)
 
 
 def on_axis(num: Poly, den: Poly) -> tuple[Poly, Poly]:
-    """Real part, and imaginary part over w, of num(i w) conj den(i w): polynomials in v = w^2."""
-    (a, b) = _split(num)
-    (c, d) = _split(den)
+    """Return real part, and imaginary part over w, of num(i w) conj den(i w): polynomials in v = w^2."""
+    a, b = _even_and_odd(num)
+    c, d = _even_and_odd(den)
     v = exact_polynomial([1.0, 0.0])
     return a * c + v * b * d, b * c - a * d
 
 
-def _split(poly: Poly) -> tuple[Poly, Poly]:
-    """p(i w) = a(v) + i w b(v), v = w^2."""
+def _even_and_odd(poly: Poly) -> tuple[Poly, Poly]:
+    """Return a and b of p(i w) = a(v) + i w b(v), v = w^2."""
     ascending = poly.all_coeffs()[::-1]
-    even, odd = ([(-1) ** n * each for n, each in enumerate(ascending[k::2])][::-1] or [0] for k in (0, 1))
-    return poly.from_list(even, *poly.gens, domain=poly.domain), poly.from_list(
-        odd, *poly.gens, domain=poly.domain
-    )
+    found = []
+    for part in (ascending[0::2], ascending[1::2]):
+        signed = [(-1) ** n * each for n, each in enumerate(part)]
+        found.append(poly.from_list(signed[::-1] or [0], *poly.gens, domain=poly.domain))
+    return found[0], found[1]
 
 
 def definite(poly: Poly) -> Literal["above", "not below", "zero", ""]:
-    """Sign of a polynomial on v > 0: "above" 0 everywhere, "not below" it, "zero", or "" where it is below."""
+    """Return the sign of a polynomial on v > 0: "above" 0, "not below" it, "zero", or "" where it is below."""
     if poly.is_zero:
         return "zero"
     if poly.LC() < 0:
         return ""
     factors = poly.sqf_list()[1]
     with_roots = [order for each, order in factors if int(each.count_roots(0, None)) > int(each.eval(0) == 0)]
-    if any(order % 2 for order in with_roots):
-        return ""
-    return "not below" if with_roots else "above"
+    if not with_roots:
+        return "above"
+    return "" if any(order % 2 for order in with_roots) else "not below"
 
 
 def is_hurwitz(poly: Poly) -> bool:
-    """Whether all roots lie left of the axis, by Routh's table."""
+    """Return whether all roots lie left of the axis, by Routh's table."""
     row = poly.all_coeffs()[0::2]
     other = poly.all_coeffs()[1::2]
     if not row[0]:

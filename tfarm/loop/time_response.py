@@ -44,13 +44,6 @@ from tfarm.spectrum.table import first_frequency
 # the input of the arm as a place of excitation, and as a signal
 ACTUATOR = "actuator"
 TORQUE = "torque"
-# flexible modes below the top of the box
-USUAL_COUNT = 80
-# poles closer than 3/T are one circle, but no farther apart than 0.1 of the first mode
-# of circles; e^-40 is below the rounding
-# times that are evaluated together: with 200 terms 64 MB
-BLOCK = 20_000
-# of intervals; of a peak: less is rounding; of a record: the same time
 
 Transform = Callable[[Complex], Complex]
 
@@ -81,7 +74,7 @@ class Peak(NamedTuple):
 
 @dataclass(frozen=True)
 class DelayedResponse:
-    """What an excitation does with one delay [s]: h of each signal, (signals, n) at t >= 0.
+    """Response to an excitation with one delay [s]: h of each signal, (signals, n) at t >= 0.
 
     `late` are exponents and amplitudes (signals, m) of the poles, `direct` those of the direct response, `rests`
     inversions of what is left, the first to an early end.  `difference` (signals,) is the bound on the error of `late`
@@ -107,15 +100,14 @@ class DelayedResponse:
         is_early = t < self.end
         h = np.empty((self.off.size, t.size))
         h[:, is_early] = self.early(t[is_early])
-        h[:, ~is_early] = _summed(self.late, t[~is_early])
+        h[:, ~is_early] = _sum_terms(self.late, t[~is_early])
         return h
 
     def early(self, t: Real) -> Real:
         """Return h by the inversions."""
         first, last = self.rests
-        return np.asarray(
-            _summed(self.direct, t) + np.where(t < first.end, first.values_at(t), last.values_at(t))
-        )
+        rest = np.where(t < first.end, first.values_at(t), last.values_at(t))
+        return np.asarray(_sum_terms(self.direct, t) + rest)
 
     def errors(self, t: Real) -> Real:
         """Return the bound on the error of h."""
@@ -142,13 +134,13 @@ class TimeResponse:
 
     def at(self, t: Real, *, before: bool = False) -> Real:
         """Return the signals (signals, n) at times t [s], after a jump, or before it."""
-        return self._summed(t, DelayedResponse.values, before=before)
+        return self._sum_parts(t, DelayedResponse.values, before=before)
 
     def remainder(self, t: Real) -> Real:
         """Return the bound (signals, n) on the error of the signals at times t [s]."""
-        return self._summed(t, DelayedResponse.errors, np.abs)
+        return self._sum_parts(t, DelayedResponse.errors, np.abs)
 
-    def _summed(
+    def _sum_parts(
         self,
         t: Real,
         h: Callable[[DelayedResponse, Real], Real],
@@ -156,13 +148,15 @@ class TimeResponse:
         *,
         before: bool = False,
     ) -> Real:
-        """Sum of w_i h(t - t_i), the weights or their sizes, in blocks of times."""
+        """Return the sum of w_i h(t - t_i), the weights or their sizes, in blocks of times."""
+        # times that are evaluated together: with 200 terms 64 MB
+        most_times = 20_000
         found = np.zeros((len(self.names), t.size))
         for part in self.parts:
             for time, weight in zip(self.excitation.times, self.excitation.weights, strict=True):
                 start = time + part.delay
                 later = np.flatnonzero(t > start if before else t >= start)
-                for block in np.array_split(later, 1 + later.size // BLOCK):
+                for block in np.array_split(later, 1 + later.size // most_times):
                     found[:, block] += size(weight) * h(part, t[block] - start)
         return found
 
@@ -173,23 +167,22 @@ class TimeResponse:
         The bound of a peak includes what they may hold, and the rounding of its value, 2.2e-16 of its size.  `most` is
         infinite of an impulse.
         """
-        # of intervals; of a peak: less is rounding; of a record: the same time
+        # of an interval
         cuts = 8
+        # of a peak: less is rounding
         seen = 1e-13
-        same_time = 1e-10
         jumps = self.starts[self.starts <= t[-1]]
-        t = np.union1d(t[abs(t[:, None] - jumps).min(axis=1, initial=math.inf) > same_time * t[-1]], jumps)
-        t = t[np.diff(t, append=math.inf) > same_time * t[-1]]
+        t = _with_jumps(t, jumps)
         after = self.at(t)
         before = after.copy()
         at_jump = np.isin(t, jumps)
         before[:, at_jump] = self.at(t[at_jump], before=True)
         ends = np.array([t[:-1], t[1:]])
         y = np.array([after[:, :-1], before[:, 1:]])
-        bends = np.where(
-            np.isin(t[1:-1], jumps), 0, abs(np.diff((y[1] - y[0]) / np.diff(t))) * 2 / (t[2:] - t[:-2])
-        )
-        more = _of_both(bends) * np.diff(t) ** 2 / 4
+        steps = np.diff(t)
+        bends = abs(np.diff((y[1] - y[0]) / steps)) * 2 / (t[2:] - t[:-2])
+        bends[:, at_jump[1:-1]] = 0.0
+        more = _of_both(bends) * steps**2 / 4
         errors = self.remainder(t)
         errors = np.maximum(errors[:, :-1], errors[:, 1:])
         most = np.zeros(len(self.names))
@@ -197,44 +190,58 @@ class TimeResponse:
         values = [np.hstack([*y])]
         for most_open in (*[3000] * 8, 0):
             largest = abs(np.hstack(values)).max(axis=1, keepdims=True) + LEAST_SIZE
-            could = abs(y).max(axis=0) + np.where(more > seen * largest, more, 0.0)
-            excess = np.where((could > largest) & (more > seen * largest), could / largest, 0.0).max(axis=0)
+            is_seen = more > seen * largest
+            could = abs(y).max(axis=0) + np.where(is_seen, more, 0.0)
+            excess = np.where((could > largest) & is_seen, could / largest, 0.0).max(axis=0)
             is_open = np.argsort(-excess)[: min(most_open, np.count_nonzero(excess))]
             most = np.maximum(most, np.delete(could + errors, is_open, axis=1).max(axis=1, initial=0.0))
             every = np.linspace(ends[0, is_open], ends[1, is_open], cuts + 1)
-            inner = self.at(every[1:-1].ravel())
-            times = [*times, every[1:-1].ravel()]
-            values = [*values, inner]
+            between = every[1:-1].ravel()
+            inner = self.at(between)
+            times.append(between)
+            values.append(inner)
             whole = np.stack([y[0][:, is_open], *np.split(inner, cuts - 1, axis=1), y[1][:, is_open]], axis=1)
             more = np.hstack([*_of_both(abs(np.diff(whole, 2, axis=1))).swapaxes(0, 1)]) / 4
             y = np.array([np.hstack([*part.swapaxes(0, 1)]) for part in (whole[:, :-1], whole[:, 1:])])
             ends = np.array([every[:-1].ravel(), every[1:].ravel()])
             errors = np.tile(errors[:, is_open], cuts)
-        t = np.concatenate(times)
-        y = np.hstack(values)
+        return self._peaks_of(np.concatenate(times), np.hstack(values), most)
+
+    def _peaks_of(self, t: Real, y: Real, most: Real) -> dict[str, Peak]:
+        """Return the peak of each signal from its values (signals, n) at times t and a bound on its size between."""
         largest = (1 - 1e-14) * abs(y).max(axis=1, keepdims=True)
         # the first time of a constant
         places = np.where(abs(y) >= largest, t, math.inf).argmin(axis=1)
-        found = np.array([t[places], y[:, places].diagonal(), self.remainder(t[places]).diagonal(), most])
-        found[2] = np.max([found[2], most - abs(found[1]), MACHINE_EPS * abs(found[1])], axis=0)
-        found[3] = (
-            abs(found[1]) + found[2] + sum(np.where(np.isinf(part.off), math.inf, 0.0) for part in self.parts)
-        )
+        time = t[places]
+        value = y[:, places].diagonal()
+        size = abs(value)
+        bound = np.max([self.remainder(time).diagonal(), most - size, MACHINE_EPS * size], axis=0)
+        most = size + bound
+        for part in self.parts:
+            most = np.where(np.isinf(part.off), math.inf, most)
+        found = np.array([time, value, bound, most])
         return {name: Peak(*each) for name, each in zip(self.names, found.T.tolist(), strict=True)}
 
     def near_starts(self, end: float) -> Real:
-        """Times [s] up to an end at which the beginnings after each start are resolved."""
+        """Return times [s] up to an end at which the beginnings after each start are resolved."""
         shares = np.r_[np.geomspace(1e-6, 1, 300), np.linspace(0, 1, 700)]
         t = np.unique([start + part.end * shares for part in self.parts for start in self.starts])
         return t[t <= end]
 
 
+def _with_jumps(t: Real, jumps: Real) -> Real:
+    """Return times and those of jumps, ascending, each once: those closer than 1e-10 of the record are one."""
+    same_time = 1e-10
+    t = np.union1d(t[abs(t[:, None] - jumps).min(axis=1, initial=math.inf) > same_time * t[-1]], jumps)
+    return t[np.diff(t, append=math.inf) > same_time * t[-1]]
+
+
 def _of_both(bends: Real) -> Real:
-    """The larger of the values (rows, n, ...) at both ends of each interval (rows, n + 1, ...), 0 at the outer ones."""
+    """Return the larger value (rows, n, ...) of both ends of each interval (rows, n + 1, ...), 0 at the outer ones."""
     return np.maximum(np.insert(bends, 0, 0.0, axis=1), np.insert(bends, bends.shape[1], 0.0, axis=1))
 
 
-def usual_poles(loop: ContinuousLoop, count: int = USUAL_COUNT) -> Poles:
+def usual_poles(loop: ContinuousLoop, count: int = 80) -> Poles:
     """Return the poles of a response: those below a frequency with `count` flexible modes, complete in their box.
 
     Raises ConvergenceError where they are not complete.
@@ -253,17 +260,15 @@ def time_response(
     # exponent of the fastest growing pole at the end of a record
     most_growth = 500.0
     growth = float(poles.values.real.max(initial=0.0)) * duration
-    require(
-        growth < most_growth,
-        "duration",
-        duration,
-        f"the loop is unstable and grows by e^{growth:.0f}; at most {most_growth * duration / max(growth, 1):.3g} s",
-    )
-    delay = poles.loop.law.delay
+    longest = most_growth * duration / max(growth, 1)
+    remedy = f"the loop is unstable and grows by e^{growth:.0f}; at most {longest:.3g} s"
+    require(growth < most_growth, "duration", duration, remedy)
+    loop = poles.loop
+    delay = loop.law.delay
     kinds = [(0.0, True, False), (delay, False, True)] if delay else [(0.0, True, True)]
-    of = [(start, Transforms(poles.loop, names, excitation, *which)) for start, *which in kinds]
-    acting = [(start, each) for start, each in of if each.parts(each.far)[0].any()]
-    parts = [_part(poles, each, start, duration) for start, each in acting or of[:1]]
+    delayed = [(start, Transforms(loop, names, excitation, *which)) for start, *which in kinds]
+    acting = [(start, each) for start, each in delayed if each.parts(each.far)[0].any()]
+    parts = [_respond(poles, each, start, duration) for start, each in acting or delayed[:1]]
     return TimeResponse((*names, TORQUE), excitation, poles, tuple(parts))
 
 
@@ -271,7 +276,7 @@ def time_response(
 class Transforms:
     """H of the signals and the torque, its direct part and the rest, each (signals, n) at s (n,).
 
-    `acts`: of what acts at the actuator and is added.  `refers`: of references and of what the law feeds back of it,
+    `acts`: of inputs at the actuator and free motions.  `refers`: of references and of free motions that are fed back,
     without the factor e^{-s tau} of its delay.
     """
 
@@ -284,29 +289,28 @@ class Transforms:
     @cached_property
     def far(self) -> Complex:
         """Places far right of all poles [1/s]."""
-        return np.array(FAR_RIGHT, complex) * max(
-            first_frequency(self.loop.arm), *abs(self.loop.law.poles), 0.0
-        )
+        fastest = abs(self.loop.law.poles).max(initial=first_frequency(self.loop.arm))
+        return np.array(FAR_RIGHT, complex) * fastest
 
     @cached_property
     def shares(self) -> Real:
-        """Limits of N/drive for s -> inf (signals, 1): what follows the torque at once; where there is none, 0."""
+        """Limits of N/drive for s -> inf (signals, 1): the share that follows the torque at once, or 0."""
         drive, row = self._rig(self.far)
         ratio = np.array([row[name] for name in self.names]) / drive
         follows = abs(ratio[:, -1] - ratio[:, -2]) <= 1e-3 * abs(ratio[:, -1])
         return np.r_[np.where(follows, ratio[:, -1].real, 0.0), 1.0][:, None]
 
     def _rig(self, s: Complex) -> tuple[Complex, dict[str, Complex]]:
-        """Drive and numerators by name."""
-        of = Signals(self.loop.arm, tuple(dict.fromkeys((*self.loop.law.signals, *self.names))))
-        drive, numerators, _ = of.parts(s)
-        return drive, dict(zip(of.names, numerators, strict=True))
+        """Return drive and numerators by name."""
+        read = Signals(self.loop.arm, tuple(dict.fromkeys((*self.loop.law.signals, *self.names))))
+        drive, numerators, _ = read.parts(s)
+        return drive, dict(zip(read.names, numerators, strict=True))
 
     def parts(self, s: Complex) -> tuple[Complex, Complex, Complex]:
         """Return H, its direct part, and the rest."""
         law = self.loop.law
         excitation = self.excitation
-        (drive, row) = self._rig(s)
+        drive, row = self._rig(s)
         columns = (*law.signals, *law.wanted)
         parts, den = law.shares(s, columns)
         entries = dict(zip(columns, parts.sum(axis=0), strict=True))
@@ -314,10 +318,13 @@ class Transforms:
         free = {name: motion(s) for name, motion in excitation.free.items()}
         driven = 0 * s
         for name, X in excitation.inputs.items():
-            if self.acts if name == ACTUATOR else self.refers:
-                driven = driven + X(s) * (den if name == ACTUATOR else entries[name])
-        for name in free.keys() & {*law.signals} if self.refers else ():
-            driven = driven - entries[name] * free[name]
+            if name != ACTUATOR and self.refers:
+                driven = driven + X(s) * entries[name]
+            elif name == ACTUATOR and self.acts:
+                driven = driven + X(s) * den
+        if self.refers:
+            for name in free.keys() & {*law.signals}:
+                driven = driven - entries[name] * free[name]
         added = np.array([free.get(name, 0 * s) * self.acts for name in (*self.names, TORQUE)])
         rig = np.array([*(row[name] for name in self.names), drive])
         D = drive * den + fed_back
@@ -329,17 +336,16 @@ class Transforms:
         return whole, direct, rest
 
 
-def _part(poles: Poles, of: Transforms, start: float, duration: float) -> DelayedResponse:
-    """The response to a part of the excitation."""
-    most_close = 0.1
+def _respond(poles: Poles, of: Transforms, start: float, duration: float) -> DelayedResponse:
+    """Return the response to a part of the excitation."""
     left, _, _, top = poles.box
     own = np.array(of.excitation.poles, complex)
     known = np.r_[poles.values, own]
     edges = [*poles.loop.k.singular, left, 1j * top]
-    late = _terms(
-        known, edges, most_close * first_frequency(poles.loop.arm), lambda s: of.parts(s)[0], duration
-    )
-    slowest = float(late[0].real[late[0].imag > top / 2].max(initial=left))
+    most_close = 0.1 * first_frequency(poles.loop.arm)
+    late = _terms(known, edges, most_close, lambda s: of.parts(s)[0], duration)
+    exponents, _ = late
+    slowest = float(exponents.real[exponents.imag > top / 2].max(initial=left))
 
     # 20 time constants of the poles outside the box; above it as well, or until frequencies up to four times its top
     decayed = 20.0
@@ -354,20 +360,22 @@ def _part(poles: Poles, of: Transforms, start: float, duration: float) -> Delaye
     part = DelayedResponse(start, late, direct, rests, np.zeros(0), slowest, np.zeros(0))
 
     t = np.linspace(0.8 * end, end, 400)
-    ends = _summed(late, t)
+    ends = _sum_terms(late, t)
     apart = abs(ends - part.early(t)) + rests[-1].errors_at(t)
     # s times the transform of the direct sum, right of its circles and far right, where it is h(0+)
-    s = np.r_[(10 / end + abs(of.loop.law.poles).max(initial=0.0)) * np.array([1.0, 3.0]), of.far]
+    right = 10 / end + abs(of.loop.law.poles).max(initial=0.0)
+    s = np.r_[right * np.array([1.0, 3.0]), of.far]
     _, at_once, after = of.parts(s)
     before, limit = abs((at_once + after) * s)[:, -2:].T
     z, amplitudes = direct
-    off = abs((at_once - (amplitudes / (s[:, None, None] - z)).sum(axis=-1).T).real * s).max(axis=1)
+    transform = (amplitudes / (s[:, None, None] - z)).sum(axis=-1).T
+    off = abs((at_once - transform).real * s).max(axis=1)
     off[(limit > 2 * before) & (limit > abs(ends).max(axis=1))] = math.inf
     return replace(part, difference=2 * apart.max(axis=1), off=off)
 
 
-def _summed(terms: tuple[Complex, Complex], t: Real) -> Real:
-    """Re of the sum of the terms (signals, n) at times t [s]."""
+def _sum_terms(terms: tuple[Complex, Complex], t: Real) -> Real:
+    """Return Re of the sum of the terms (signals, n) at times t [s]."""
     z, amplitudes = terms
     return np.asarray((amplitudes @ np.exp(np.outer(z, t))).real)
 
@@ -375,7 +383,7 @@ def _summed(terms: tuple[Complex, Complex], t: Real) -> Real:
 def _terms(
     known: Complex, edges: Sequence[complex], most_close: float, transform: Transform, duration: float
 ) -> tuple[Complex, Complex]:
-    """Exponents (m,) and amplitudes (signals, m) of each pole or circle with Im >= 0, twice those with a conjugate.
+    """Return exponents (m,) and amplitudes (signals, m) of poles and circles with Im >= 0, twice with a conjugate.
 
     Real edges bound circles on the real axis, imaginary ones at any place.
     """
@@ -385,20 +393,21 @@ def _terms(
     on_axis = 1e-9
     every, count = np.unique(np.r_[0, known, known[known.imag != 0].conj()], return_counts=True)
     reach = min(close / duration, most_close)
+    beyond = 2 * (abs(every).max() + 1 / duration)
     # a multiple pole that rounding has split
     alike = 0.01 * np.maximum(-np.maximum.outer(every.real, every.real), 0)
     _, label = connected_components(abs(every[:, None] - every) <= np.maximum(reach, alike))
     found = []
     for n in range(label.max() + 1):
-        own = every[label == n]
-        order = int(count[label == n].sum())
+        is_inside = label == n
+        own = every[is_inside]
         c = complex(own.mean())
-        beyond = 2 * (abs(every).max() + 1 / duration)
+        if c.imag < -on_axis * reach:
+            continue
         nearest = [complex(edge.real or c.real, edge.imag or c.imag) for edge in map(complex, edges)]
-        room = float(abs(np.r_[every[label != n], nearest, beyond] - c).min())
-        if c.imag >= -on_axis * reach:
-            z, amplitudes = _circle(own, order, c, room, transform, duration)
-            found.append((z, amplitudes * (2.0 if c.imag > on_axis * reach else 1.0)))
+        room = float(abs(np.r_[every[~is_inside], nearest, beyond] - c).min())
+        z, amplitudes = _circle(own, int(count[is_inside].sum()), c, room, transform, duration)
+        found.append((z, 2.0 * amplitudes if c.imag > on_axis * reach else amplitudes))
     z, amplitudes = zip(*found, strict=True)
     return np.concatenate(z), np.hstack(amplitudes)
 
@@ -406,27 +415,27 @@ def _terms(
 def _circle(
     own: Complex, order: int, c: complex, room: float, transform: Transform, duration: float
 ) -> tuple[Complex, Complex]:
-    """The nodes of a circle around poles, to a distance of `room` from others; of a simple pole its residue."""
+    """Return the nodes of a circle around poles, to a distance of `room` from others; of a simple pole its residue."""
     # over T, of a circle around s = 0, on which e^{s T} is moderate; or times the extent of its poles
     slow_radius = 2.0
     # of the way to the next pole: radius of the circle of one pole
     pole_radius = 0.25
-    # of circles; e^-40 is below the rounding
-    pole_nodes = 32
-    fewest_nodes = 128
-    most_nodes = 512
+    # of the logarithm of what is left out: e^-40 is below the rounding
     node_log = 40.0
+    most_nodes = 512
     is_simple = order == 1 and c != 0
     extent = float(abs(own - c).max())
     radius = pole_radius * room
+    fewest_nodes = 32
     if not is_simple:
+        fewest_nodes = 128
         # where e^{s t} does not grow
         moderate = max(slow_radius * max(extent, 1 / duration), -c.real / 2)
         radius = min(max(math.sqrt(extent * room), radius), moderate)
     ratio = max(extent / radius, radius / room)
-    nodes = int(np.clip(-node_log / math.log(ratio), pole_nodes if is_simple else fewest_nodes, most_nodes))
+    nodes = int(np.clip(-node_log / math.log(ratio), fewest_nodes, most_nodes))
     arrow = radius * np.exp(2j * np.pi * (np.arange(nodes) + 0.5) / nodes)
     values = transform(c + arrow) * arrow / nodes
     if is_simple:
-        return (own, values.sum(axis=1)[:, None])
-    return (c + arrow, values)
+        return own, values.sum(axis=1)[:, None]
+    return c + arrow, values

@@ -94,22 +94,27 @@ class Varied:
     @property
     def unit(self) -> str:
         """The SI unit of the number, "1" of a pure one."""
-        of_other = ARM_PARAMETERS | {"delay": "s"}
         if self.vary in NAMES:
             return unit_of(self.vary, self.case.arm)
-        return of_other.get(self.vary, "1")
+        if self.vary == "delay":
+            return "s"
+        return ARM_PARAMETERS.get(self.vary, "1")
 
     @property
     def title(self) -> Title:
         """Label and unit of the number, for a heading; a pure one has no unit."""
-        # labels of these numbers
-        factors = {"all": "factor on all gains", "gain": "factor on the controller"}
         name = self.vary.removesuffix(".gain")
-        plain = name.replace("_", " ") if self.is_of_arm else name
-        is_factor = name.partition("@")[0] in OUTPUTS
-        return factors.get(
-            name, f"factor on {plain}" if is_factor else plain
-        ), "" if self.unit == "1" else self.unit
+        if name == "all":
+            label = "factor on all gains"
+        elif name == "gain":
+            label = "factor on the controller"
+        elif self.is_of_arm:
+            label = name.replace("_", " ")
+        elif name.partition("@")[0] in OUTPUTS:
+            label = f"factor on {name}"
+        else:
+            label = name
+        return label, "" if self.unit == "1" else self.unit
 
     @property
     def is_reactive(self) -> bool:
@@ -122,27 +127,26 @@ class Varied:
         return self.case.feedback
 
     def law_at(self, value: float) -> Law:
-        """The law where the number has that value."""
+        """Return the law where the number has that value."""
         if self.is_of_arm:
             return self.full
         return self.full.having("gain" if self.vary == "all" else self.vary, value)
 
     def at(self, value: float) -> ContinuousLoop:
-        """The loop where the number has that value."""
+        """Return the loop where the number has that value."""
         if self.is_of_arm:
-            return self._of_arm(value)
+            return self._loop_of_arm(value)
         return self.first.under(self.law_at(value))
 
-    # arms at values that are needed again
     @cached_property
-    def _of_arm(self) -> Callable[[float], ContinuousLoop]:
-        """The same of a number of the arm: of the last values it is kept."""
+    def _loop_of_arm(self) -> Callable[[float], ContinuousLoop]:
+        """The loop where a number of the arm has a value: of the last values it is kept."""
 
         @lru_cache(200)
-        def of_arm(value: float) -> ContinuousLoop:
+        def loop_of_arm(value: float) -> ContinuousLoop:
             return ContinuousLoop(self.case.on(self.case.arm.having(**{self.vary: value})))
 
-        return of_arm
+        return loop_of_arm
 
     @cached_property
     def first(self) -> ContinuousLoop:
@@ -169,24 +173,23 @@ class Varied:
         return terms, terms.line(name)
 
     def function(self, s: Complex, values: Real) -> Analytic:
-        """D/s^n at s (n,), each at a value of its own (n,), n = `pinned`, with slopes from differences."""
+        """Return D/s^n at s (n,), each at a value of its own (n,), n = `pinned`, with slopes from differences."""
         s = np.where(s == 0, NEAREST_TO_ORIGIN * self.frequency, s)
         return by_differences(self.first.k, lambda at: self._characteristic(at, values), s, self.pinned)
 
     def _characteristic(self, s: Complex, values: Real) -> tuple[Complex, Complex]:
-        """D e^{-scale} and scale at s (k, n), each column at a value of its own (n,)."""
+        """Return D e^{-scale} and scale at s (k, n), each column at a value of its own (n,)."""
         if self.is_of_arm:
             found = np.empty((2, *s.shape), complex)
             for value in np.unique(values):
                 here = values == value
                 found[:, :, here] = self.at(float(value)).characteristic(s[:, here])
             return found[0], found[1]
-        (terms, line) = self.terms
+        terms, line = self.terms
         rig = self.first.signals.parts(s)
         rows = terms.of(s, rig)
-        others, alone = (np.tensordot(each, rows, 1) for each in (line.others, line.alone))
         share = np.exp(-s * (values - self.full.delay)) if self.vary == "delay" else values
-        return others + share * alone, rig.scale
+        return np.tensordot(line.others, rows, 1) + share * np.tensordot(line.alone, rows, 1), rig.scale
 
     @cached_property
     def frequency(self) -> float:
@@ -194,7 +197,7 @@ class Varied:
         return first_frequency(self.first.arm)
 
     def resting(self, values: Real) -> Whole:
-        """Number of poles beyond `pinned` at s = 0 at each of the values (n,).
+        """Return the number of poles beyond `pinned` at s = 0 at each of the values (n,).
 
         D has a zero of higher order there, or a pole of the loop is slower than the two frequencies: the loop decides.
         """
@@ -207,7 +210,7 @@ class Varied:
         return found
 
     def at_rest(self, value: float) -> float:
-        """D/s^n at s = 0, real, up to a positive factor: a real pole passes through 0 where it changes its sign."""
+        """Return D/s^n at s = 0, real, up to a positive factor: at its change of sign a real pole passes through 0."""
         s = NEAREST_TO_ORIGIN * self.frequency * np.array([1.0, -1.0]) + 0j
         found = self.function(s, np.full(2, value))
         return float((found.value * np.exp(1j * found.scale.imag)).real.mean())
@@ -215,7 +218,7 @@ class Varied:
     # ------------------------------------------------------------ interface of `spectrum.following`
 
     def near(self, values: Real, guess: Complex) -> Complex:
-        """The poles (m, b) next to the guesses at m values, by Newton's method; NaN where it does not settle."""
+        """Return the poles (m, b) next to the guesses at m values, by Newton's method; NaN where it does not settle."""
         found = guess.copy()
         resting = self.resting(values)
         rests = np.zeros(guess.shape, bool)
@@ -228,21 +231,20 @@ class Varied:
         for n in np.flatnonzero((wanted & (guess == 0)).any(axis=1)):
             leaving = wanted[n] & (guess[n] == 0)
             found[n, leaving] = self.slow(float(values[n]), int(leaving.sum()))
-        found[wanted] = polish_roots(
-            self.function, found[wanted], np.broadcast_to(values[:, None], guess.shape)[wanted]
-        )
+        each = np.broadcast_to(values[:, None], guess.shape)
+        found[wanted] = polish_roots(self.function, found[wanted], each[wanted])
         found[rests] = 0.0
         return found
 
     def slow(self, value: float, count: int) -> Complex:
-        """The `count` poles next to 0 at a value, the upper, or larger, first; NaN for missing ones."""
+        """Return the `count` poles next to 0 at a value, the upper, or larger, first; NaN for missing ones."""
         found = slow_poles(self.at(value), self.frequency)
         nearest = found[np.argsort(abs(found))[:count]]
         nearest = nearest[np.lexsort((-nearest.real, -nearest.imag))]
         return np.r_[nearest, np.full(count - nearest.size, np.nan)]
 
     def complete(self, value: float, guess: Complex) -> Complex:
-        """All poles in the box at one value, both of each pair, and those next to the guesses that lie outside it."""
+        """Return all poles in the box at one value, both of each pair, and those next to guesses outside it."""
         near = self.near(np.array([value]), np.where(guess.imag < 0, np.nan, guess)[None])[0]
         near = near[~np.isnan(near) & (near != 0) & ~self.box.holds(near)]
         # of a pole on its way through infinity
@@ -252,7 +254,7 @@ class Varied:
         return np.r_[upper, upper[upper.imag > 0].conj()]
 
     def singular(self, values: Real) -> Real:
-        """-1/C of the damped segments, at m values (m, p)."""
+        """Return -1/C of the damped segments, at m values (m, p)."""
         if not self.is_of_arm:
             return np.tile(np.array(self.first.k.singular), (values.size, 1))
         return np.array([self.at(float(value)).k.singular for value in values])
@@ -260,7 +262,7 @@ class Varied:
     # ------------------------------------------------------------ complete in a box
 
     def with_box(self, modes: int) -> Varied:
-        """The same with a box for all values, as high as `modes` modes, no pole on its edge at the first value."""
+        """Return the loops with one box, as high as `modes` modes, no pole on its edge at the first value."""
         loops = [self.at(value) for value in self.few]
         # heights of the box, until no pole is on its edge at the first value
         for factor in (1.0, 1.013, 1.031, 1.057, 0.985, 1.09):
@@ -275,5 +277,5 @@ class Varied:
         )
 
     def count(self, value: float) -> int:
-        """Number of poles in the box at one value, without those at 0, by the winding number."""
+        """Return the number of poles in the box at one value, without those at 0, by the winding number."""
         return winding_number(self.at(value).function, self.box)

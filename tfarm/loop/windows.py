@@ -17,20 +17,14 @@ from tfarm.errors import ConvergenceError
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.lines import LEADING, Along, LawTerms, critical, cross_axis, static_edge, unstable_below
 from tfarm.loop.stability import Stability, band_of_family, is_known_without, verdict_on
-from tfarm.loop.theorem import TAKES, cancel_hub_moment
+from tfarm.loop.theorem import Energy, cancel_hub_moment
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.gains import gain_unit, most_gain
 from tfarm.spectrum.table import first_frequency
 
 End = Literal["edge", "search bound", "no limit"]
-SEARCH_RANGE = Quantity(
-    "search range", digits=5, key="search_range", help="values between which limits were searched"
-)
 ENDS = "an end with < or > is that of the search range: no limit was found up to there"
-
-# of the search range, times `gain_unit`
-FARTHER_REACH = {MOMENT_GAIN: 50.0}
 
 
 class Interval(NamedTuple):
@@ -46,7 +40,7 @@ class Interval(NamedTuple):
     ] = "edge"
 
     def as_text(self, digits: int) -> str:
-        """The interval; < or > marks an end that is only that of the search."""
+        """Return the interval; < or > marks an end that is only that of the search."""
         low = "< " * (self.low_is == "search bound") + f"{self.low:.{digits}g}"
         high = "> " * (self.high_is == "search bound") + f"{self.high:.{digits}g}"
         return f"({low}, {high})"
@@ -70,7 +64,12 @@ class Windows:
     ]
     around: Window | None
     all: tuple[Window, ...]
-    looked_at: Annotated[Window, SEARCH_RANGE]
+    looked_at: Annotated[
+        Window,
+        Quantity(
+            "search range", digits=5, key="search_range", help="values between which limits were searched"
+        ),
+    ]
     crossings: Crossings
     band: Annotated[
         float, Quantity(key="up_to_rad_s", help="frequency up to which crossings were searched")
@@ -79,20 +78,21 @@ class Windows:
     @property
     def interval(self) -> Annotated[Interval | None, Quantity("stable around it", digits=8, help=ENDS)]:
         """The interval around the value, with the kinds of its ends."""
-        return None if self.around is None else self._shown(self.around)
+        return None if self.around is None else self._with_kinds(self.around)
 
     @property
     def intervals(
         self,
     ) -> Annotated[list[Interval], Quantity("all stability intervals", digits=8, help=ENDS)]:
         """All intervals, with the kinds of their ends."""
-        return list(map(self._shown, self.all))
+        return list(map(self._with_kinds, self.all))
 
-    def _shown(self, pair: Window) -> Interval:
+    def _with_kinds(self, pair: Window) -> Interval:
+        """Return an interval, with the kinds of its ends."""
         return Interval(*pair, *map(self.end, pair))
 
     def end(self, value: float) -> End:
-        """The kind of an end of one of the intervals."""
+        """Return the kind of an end of one of the intervals."""
         if math.isinf(value):
             return "no limit"
         if value in self.looked_at:
@@ -111,12 +111,14 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
     one band: high enough for both ends of each range, or that of a verdict beyond which nothing is known.
     """
     loop = verdict.loop
-    numbers = verdict.loop.numbers
+    numbers = loop.numbers
     if not loop.is_of_gains and (verdict.word == "marginal" or loop.arm.has_elastic_link):
         return {}
     ranges = {name: looked_at(loop, name) for name in names or numbers}
     solved = {
-        name: pair for name, pair in ranges.items() if pair[0] < pair[1] and not is_decided_along(loop, name)
+        name: (low, high)
+        for name, (low, high) in ranges.items()
+        if low < high and not is_decided_along(loop, name)
     }
     lines, band = _lines(verdict, solved)
     done: dict[str, Windows] = {}
@@ -137,63 +139,66 @@ def windows_of(verdict: Stability, names: Iterable[str] | None = None) -> dict[s
             stable = theorem_windows(loop, name, limits, found)
         stable = [_with_proven_ends(loop, name, pair, limits) for pair in stable]
         # Kp = 0 is an end of its own interval: that is the pole at 0 which the verdict leaves out
-        inside = (
-            pair for pair in stable if pair[0] < value < pair[1] or (name == "Kp" and pair[0] == value == 0)
-        )
+        is_end = name == "Kp" and value == 0
+        inside = ((low, high) for low, high in stable if low < value < high or (is_end and low == 0))
         around = next(inside, None) if verdict.is_stable else None
         done[name] = Windows(name, value, unit, around, tuple(stable), limits, found.within(*limits), reach)
     return done
 
 
 def looked_at(loop: ContinuousLoop, name: str) -> Window:
-    """The search range of a number: well beyond values that matter to the first mode, or ten times its value.
+    """Return the search range of a number: well beyond values that matter to the first mode, or ten times its value.
 
     Of a leading coefficient without which high modes are unstable: from a tenth of its value on, with its sign.
     """
-    # of the search range, times `gain_unit`
-    window_reach = 20.0
-    # times the number of the law: least search range too
+    # times the number of the law
     beyond_law = 10.0
     arm = loop.arm
     value = loop.numbers[name]
+    least = beyond_law * abs(value)
     if not loop.is_of_gains:
         if name.endswith(LEADING) and value and not is_known_without(loop, name):
             low, high = sorted((value / beyond_law, value * beyond_law))
             return low, high
-        return -beyond_law * abs(value), beyond_law * abs(value)
-    if name == MOMENT_GAIN and arm.has_massless_hub:
+        return -least, least
+    if name != MOMENT_GAIN:
+        reach = max(20.0 * gain_unit(arm, name), least)
+    elif arm.has_massless_hub:
         return 0.0, 0.0
-    reach = max(FARTHER_REACH.get(name, window_reach) * gain_unit(arm, name), beyond_law * abs(value))
-    carried = arm.gauged_inertia
-    if name == MOMENT_GAIN and 0 < carried < math.inf:
-        # 2.0 times J/(J - I_h), where K2 cancels the inertia: least search range
-        reach = max(reach, 2.0 * arm.turned_inertia / carried)
+    else:
+        reach = max(50.0 * gain_unit(arm, name), least)
+        carried = arm.gauged_inertia
+        if 0 < carried < math.inf:
+            # 2.0 times J/(J - I_h), where K2 cancels the inertia
+            reach = max(reach, 2.0 * arm.turned_inertia / carried)
     most = min(most_gain(arm, name), reach)
     return -most, most
 
 
 def _lines(verdict: Stability, ranges: dict[str, Window]) -> tuple[dict[str, Callable[[], Crossings]], float]:
-    """What makes the crossings along each number in its range, all solved for at once, and their band [rad/s]."""
+    """Return functions of the crossings along each number in its range, solved for at once, and their band [rad/s]."""
     loop = verdict.loop
     band = verdict.band
     if not ranges:
         return {}, band
     if verdict.is_known_beyond or loop.is_of_gains:
-        ends = (loop.having(name, end) for name, pair in ranges.items() for end in critical(name, pair))
-        band = max(band, band_of_family(ends)[0])
+        loops: list[ContinuousLoop] = []
+        for name, pair in ranges.items():
+            loops += [loop.having(name, end) for end in critical(name, pair)]
+        band = max(band, band_of_family(loops)[0])
     terms = LawTerms(loop.signals, loop.law, ranges)
     lines = [Along(lambda: loop, name, terms.line(name, *pair)) for name, pair in ranges.items()]
     return dict(zip(ranges, cross_axis(loop.arm, terms, band, lines), strict=True)), band
 
 
 def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, band: float) -> list[Window]:
-    """The stability intervals, from the verdict's count.
+    """Return the stability intervals, from the verdict's count.
 
     Where nothing is known beyond the band, a pair of poles may pass through its top: then each interval is counted if
     the count at an end differs.
     """
     loop = verdict.loop
-    value = verdict.loop.numbers[name]
+    value = loop.numbers[name]
     found = without_losses(loop, name, found)
     pairs = found.spans(*limits)
     count = verdict.unstable_roots
@@ -224,7 +229,7 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
 
 
 def without_losses(loop: ContinuousLoop, name: str, found: Crossings) -> Crossings:
-    """The crossings along a gain; of a rig that loses at its hub alone all modes are at the gain that cancels the loss.
+    """Return the crossings along a gain; where only the hub loses, all modes are at the gain that cancels the loss.
 
     There D is even in s but for the part of the rate gain: poles are on the axis where that part vanishes, for all
     values of the other gains.  Elsewhere they reach it where K2 cancels the whole moment on the hub.
@@ -249,14 +254,14 @@ def without_losses(loop: ContinuousLoop, name: str, found: Crossings) -> Crossin
 
 
 def is_decided_along(loop: ContinuousLoop, name: str) -> bool:
-    """Whether a theorem without losses decides the stability of the loop for every value of this gain."""
+    """Return whether a theorem without losses decides the stability of the loop for every value of this gain."""
     if not loop.is_moved_at_hub_alone or loop.arm.input_lags:
         return False
     return loop.arm.reads_hub_moment or (name != MOMENT_GAIN and loop.numbers[MOMENT_GAIN] == 0)
 
 
 def theorem_edges(loop: ContinuousLoop, name: str, limits: Window) -> Crossings:
-    """The values of such a gain at which all modes at once, or a real pole, may cross."""
+    """Return the values of such a gain at which all modes at once, or a real pole, may cross."""
     found = [] if (static := static_edge(loop, name, limits)) is None else [static]
     at = {MOMENT_GAIN: loop.arm.input_per_torque, RATE_GAIN: 0.0 - loop.arm.rate_loss}.get(name)
     if at is not None and not any(each.t == at for each in found):
@@ -265,16 +270,15 @@ def theorem_edges(loop: ContinuousLoop, name: str, limits: Window) -> Crossings:
 
 
 def theorem_windows(loop: ContinuousLoop, name: str, limits: Window, edges: Crossings) -> list[Window]:
-    """The stability intervals of such a gain: there every mode is damped, and the static stiffness is positive."""
-    return join_neighbours(
-        [pair for pair in edges.spans(*limits) if is_held(loop.having(name, sum(pair) / 2))]
-    )
+    """Return the stability intervals of such a gain: every mode is damped, and the static stiffness is positive."""
+    pairs = edges.spans(*limits)
+    return join_neighbours([pair for pair in pairs if is_proven_stable(loop.having(name, sum(pair) / 2))])
 
 
-def is_held(loop: ContinuousLoop) -> bool:
-    """Whether a theorem excludes unstable poles: every mode is damped, and the static stiffness is positive."""
+def is_proven_stable(loop: ContinuousLoop) -> bool:
+    """Return whether a theorem excludes unstable poles: every mode is damped, and the static stiffness is positive."""
     parts = cancel_hub_moment(loop)
-    if parts is None or not parts[0] < 1 or loop.theorem.energy != TAKES:
+    if parts is None or not parts[0] < 1 or loop.theorem.energy != Energy.LOSS:
         return False
     # 1e-9 of the lowest frequency: L there is that of an arm at rest
     small = np.array([1e-9 * first_frequency(loop.arm)], dtype=complex)
@@ -282,18 +286,18 @@ def is_held(loop: ContinuousLoop) -> bool:
 
 
 def _with_proven_ends(loop: ContinuousLoop, name: str, pair: Window, limits: Window) -> Window:
-    """The interval with ends of the search replaced by infinity where a theorem holds beyond them."""
-    end, beyond = (0, -math.inf) if name == MOMENT_GAIN else (1, math.inf)
-    if not loop.is_of_gains or pair[end] != limits[end] or not is_held(loop.having(name, pair[end])):
+    """Return the interval with ends of the search replaced by infinity where a theorem holds beyond them."""
+    end = 0 if name == MOMENT_GAIN else 1
+    if not loop.is_of_gains or pair[end] != limits[end] or not is_proven_stable(loop.having(name, pair[end])):
         return pair
-    return (beyond, pair[1]) if end == 0 else (pair[0], beyond)
+    low, high = pair
+    return (low, math.inf) if end else (-math.inf, high)
 
 
 def reach_words(found: Iterable[Windows]) -> str:
-    """A sentence about intervals that are known in a frequency range alone; empty where all are known."""
+    """Return a sentence about intervals that are known in a frequency range alone; empty where all are known."""
     bands = [each.band for each in found if math.isfinite(each.band)]
     if not bands:
         return ""
-    return (
-        f"stability intervals are of poles up to {max(bands):.4g} rad/s: beyond, poles may cross inside them"
-    )
+    reach = f"{max(bands):.4g} rad/s"
+    return f"stability intervals are of poles up to {reach}: beyond, poles may cross inside them"

@@ -20,7 +20,8 @@ from tfarm.assessment.stability_map import StabilityMap
 from tfarm.crossing import Window, pieces
 from tfarm.digits import how_many, plain, scientific, significant
 from tfarm.loop.circle_crossings import GainMap
-from tfarm.loop.plane import INFINITE, LINEAR_SCALE, Axis, BoundaryLines, Plane
+from tfarm.loop.plane import INFINITE, BoundaryLines, Plane
+from tfarm.loop.plane_axes import Axis
 from tfarm.plots.frequency import bode
 from tfarm.plots.loop_function import draw_loops
 from tfarm.plots.style import (
@@ -88,7 +89,7 @@ def ground(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
     """Both axes, the colours of the count, and the count in every region that is large enough."""
     for axis, setter, name in ((x, ax.set_xscale, ax.xaxis), (y, ax.set_yscale, ax.yaxis)):
         if not axis.is_linear:
-            setter("symlog", linthresh=axis.linear, linscale=LINEAR_SCALE)
+            setter("symlog", linthresh=axis.linear, linscale=axis.linear_scale)
             plain_ticks(name)
     _counts(found, found.unstable, ax)
     ax.set(xlim=(x.low, x.high), ylim=(y.low, y.high))

@@ -10,8 +10,9 @@ from matplotlib.ticker import MaxNLocator
 from tfarm.arrays import Complex
 from tfarm.digits import kept_digits, plain, significant
 from tfarm.errors import one_line
-from tfarm.loop.loci import POLE_DIGITS, Loci, ReducedLocus, held_branches
-from tfarm.loop.locus import BranchCrossing, Locus, frame, origin_name, view
+from tfarm.loop.branches import origin_name
+from tfarm.loop.loci import POLE_DIGITS, Loci, ReducedLocus, round_branches
+from tfarm.loop.locus import BranchCrossing, Locus, frame, view
 from tfarm.loop.sampled_modes import DRAWN_RADIUS, RIM, SampledLoci, SampledLocus
 from tfarm.plots.loop_function import arrows
 from tfarm.plots.style import (
@@ -78,7 +79,7 @@ def _panel(exact: Locus, reduced: ReducedLocus | None, numbers: Sequence[int], a
     # of the reduced model
     thin: dict[str, Any] = {"lw": 0.9, "ls": (0, (2, 1.5)), "zorder": 3}
     which = list(numbers)
-    branches = held_branches(exact.smooth.branches)
+    branches = round_branches(exact.smooth.branches)
     shown = branches[which]
     everything = len(which) == len(branches)
     left, right, low, high = view(shown, exact.origin) if everything else frame(shown[shown.imag >= 0])
@@ -96,7 +97,7 @@ def _panel(exact: Locus, reduced: ReducedLocus | None, numbers: Sequence[int], a
     _draw_branches(shown, ax)
     if reduced is not None:
         ax.plot([], [], color=INK, label=f"python-control, reduced model of order {reduced.order}", **thin)
-        for s in held_branches(reduced.branches[which]):
+        for s in round_branches(reduced.branches[which]):
             # between two values where it meets the real axis: no corner is cut off
             meets = np.flatnonzero(np.diff((s.imag == 0).astype(int))) + 1
             ax.plot(np.insert(s.real, meets, np.nan), np.insert(s.imag, meets, np.nan), color=INK, **thin)
@@ -119,7 +120,7 @@ def _mark_values(exact: Locus, way: int, which: list[int], ax: Axes) -> None:
     begins = 0.0 if is_factor and min(first, last) <= 0 <= max(first, last) else first
     values = np.array([float(f"{value:.3g}") for value in np.linspace(begins, last, 5)])
     names = [plain(value, 3) for value in values.tolist()]
-    branches = held_branches(exact.branches[which])
+    branches = round_branches(exact.branches[which])
     at = np.array([np.interp(way * values, way * exact.gain, s) for s in branches])
     looks: dict[str, Any] = {"ls": "none", "color": INK, "mew": 1.3, "zorder": 4}
     start = at[:, 0]

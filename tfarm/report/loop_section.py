@@ -8,15 +8,14 @@ from typing import Annotated, NamedTuple
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, unit_of, warn_of_cancellations
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
-from tfarm.assessment.card import POOR
 from tfarm.assessment.stability_map import DESIGNED_MODES
 from tfarm.digits import plain, significant
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError
-from tfarm.loop.loci import Loci, held_branches
+from tfarm.loop.loci import Loci, round_branches
 from tfarm.loop.margins import Margins
 from tfarm.loop.nyquist import Nyquist
-from tfarm.loop.plane import DEEPEST_MOMENT_GAIN
+from tfarm.loop.plane import deepest_moment_gain
 from tfarm.loop.poles import Poles
 from tfarm.plots import loop_function, regions, roots
 from tfarm.report.blocks import Fact, PageSection, Picture, columns_of, picture, prose, sheet, upper
@@ -176,7 +175,7 @@ def map_section(report: ArmReport) -> PageSection:
         chain=report.chain,
         band=report.band,
         unit=f"{plain(report.rate_unit, 4)} {unit_of(RATE_GAIN, arm)}",
-        deepest=DEEPEST_MOMENT_GAIN * arm.input_per_torque,
+        deepest=deepest_moment_gain(arm),
     )
     return PageSection(
         title="Stability region of both gains", facts=continuous_interval_facts(report), blocks=(drawn,)
@@ -206,7 +205,7 @@ def recommended_section(report: ArmReport) -> PageSection:
     each = report.in_s[-1]
     card = results(each.card, each.title)
     # the last is the sampled one
-    if card[-1]["grade"] == POOR:
+    if card[-1]["grade"] == "poor":
         title = "Gains of best damping"
     return PageSection(title=title, answer=answer, card=card)
 
@@ -257,7 +256,7 @@ def locus_data(data: Loci) -> Sequence[Column]:
                 f"{which}_{n}_{part}", of=["" if math.isnan(value) else value for value in values.tolist()]
             )
             for which, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches))
-            for n, row in enumerate(held_branches(branches))
+            for n, row in enumerate(round_branches(branches))
             for part, values in (("re", row.real), ("im", row.imag))
         ),
     ]

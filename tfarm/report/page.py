@@ -45,11 +45,13 @@ from tfarm.loop.curve import LoopCurve
 from tfarm.loop.loci import Loci, loci
 from tfarm.loop.margins import Margins, margins
 from tfarm.loop.nyquist import Nyquist, nyquist_of
-from tfarm.loop.plane import ranges_of
+from tfarm.loop.plane_axes import ranges_of
 from tfarm.loop.poles import Poles, closed_loop_poles
+from tfarm.loop.sampled_analysis import Analysis
+from tfarm.loop.sampled_brief import SampledBrief, sampled_brief
 from tfarm.loop.sampled_modes import STRONGER, SampledLoci, sampled_loci
-from tfarm.loop.sampled_verdict import Analysis, SampledBrief, Verdict, sampled_brief, sampled_verdict
-from tfarm.loop.stability import Spill, spill
+from tfarm.loop.sampled_verdict import Verdict, sampled_verdict
+from tfarm.loop.spillover import Spill, spill
 from tfarm.plots.style import gains_words
 from tfarm.records import frozen
 from tfarm.report.blocks import argument, prose

@@ -17,7 +17,7 @@ from tfarm.digits import plain, significant
 from tfarm.dsp import Chain, Simulation, scenarios, traces
 from tfarm.errors import CertificationError, ParameterError
 from tfarm.fitting.recording import RunComparison, overshoot
-from tfarm.loop.sampled_verdict import Analysis
+from tfarm.loop.sampled_analysis import Analysis
 from tfarm.plots import animation, motion, regions, roots, style
 from tfarm.report.blocks import Fact, PageSection, Picture, columns_of, picture, prose, sheet
 from tfarm.report.page import ArmReport, PageCase, has_loop

@@ -25,7 +25,8 @@ import scipy
 from tfarm.arm import PLANE
 from tfarm.arrays import Real
 from tfarm.assessment.card import LoopCard, analysis_of, loop_card, words_of
-from tfarm.assessment.step import LoopResponse, step
+from tfarm.assessment.signal_figures import LoopResponse
+from tfarm.assessment.step import step
 from tfarm.dsp.stages import admit_case
 from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
 from tfarm.exact.system import system_of

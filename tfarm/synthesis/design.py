@@ -5,7 +5,7 @@ has the number of searches that agreed, the width of the optimum, and whether th
 """
 
 from collections.abc import Mapping, Sequence
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -18,7 +18,8 @@ from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, must_be_known, require
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.edges import most_modes
-from tfarm.loop.sampled_verdict import SampledBrief, sampled_brief, sampled_verdict
+from tfarm.loop.sampled_brief import SampledBrief, sampled_brief
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -179,9 +180,8 @@ class Design:
         list[OptimalCoefficient], Quantity("coefficients", key="coefficients", help="numbers of the law")
     ]:
         """One row for each coefficient."""
-        optima = dict.fromkeys(self.bounds, "inside") | dict.fromkeys(
-            self.widened, "inside bounds that were widened"
-        )
+        optima = dict.fromkeys(self.bounds, "inside")
+        optima |= dict.fromkeys(self.widened, "inside bounds that were widened")
         optima |= dict.fromkeys(self.at_bound, "none: search cut off at the bound")
         optima |= dict.fromkeys(self.at_limit, "at the physical limit")
         return [
@@ -198,12 +198,14 @@ class Design:
         float | None, Quantity("record of the slew", "s", 6, "duration over which the objective is taken")
     ]:
         """Length of the record of a residual or a cost, for `tfarm simulate --duration`; None of others."""
-        of_residual = self.objective == "residual"
-        if self.loop == "continuous" or not (of_residual or self.objective == "cost"):
-            return None
         arm = self.verdict.loop.arm
-        task = slew_and_after(arm, arm, self.chain) if of_residual else trial_slew(arm, self.chain)
-        return float(task.t[-1])
+        if self.loop == "continuous":
+            return None
+        if self.objective == "residual":
+            return float(slew_and_after(arm, arm, self.chain).t[-1])
+        if self.objective == "cost":
+            return float(trial_slew(arm, self.chain).t[-1])
+        return None
 
     @property
     def worst_arm(self) -> Annotated[str, Quantity("worst arm", help="the arm that limits the objective")]:
@@ -307,11 +309,11 @@ class _DesignTask:
     tell: Tell
 
     def sizes(self, on: Arm) -> list[int]:
-        """Numbers of modes of the models of an arm, in turn."""
+        """Return numbers of modes of the models of an arm, in turn."""
         return model_sizes(on, self.chain, self.modes, continuous=self.continuous)
 
     def judge(self, on: Arm, count: int) -> Judge:
-        """The judge of laws on an arm, by a model of `count` modes."""
+        """Return the judge of laws on an arm, by a model of `count` modes."""
         return judge_of(
             on,
             self.arm,
@@ -342,7 +344,7 @@ class _DesignTask:
             nearest = min(nearest, found.found[0], key=itemgetter(0))
             for score, x in found.found:
                 law = found.form.record_at(x)
-                if effort == "sketch" or (score < LOST and all(judge.holds(law) for judge in several)):
+                if effort == "sketch" or (score < LOST and all(judge.is_stable(law) for judge in several)):
                     return _Choice(Worst(several), found, score, x, law)
         score, x = nearest
         law = self.form.record_at(x)
@@ -353,36 +355,34 @@ class _DesignTask:
         raise ConvergenceError(words, law, score)
 
     def score_on(self, choice: _Choice, on: Arm) -> float:
-        """The score of a law on another arm; inf where the loop is unstable."""
+        """Return the score of a law on another arm; inf where the loop is unstable."""
         score = self.judge(on, self.sizes(on)[0]).score(choice.law)
         return score if score < LOST else np.inf
 
     def design(self, choice: _Choice, named: Sequence[NamedArm], case: WorstCase) -> Design:
-        """The record of a law for these arms."""
+        """Return the record of a law for these arms."""
         law = choice.law
         x = choice.x
         own = choice.search.form
         on_arms = []
-        for each, judge in zip(named, choice.worst.judges, strict=True):
+        for (name, _, numbers), judge in zip(named, choice.worst.judges, strict=True):
             on_arm = judge.case(law)
-            on_arms.append(
-                OnArm(each.name, each.numbers, judge.value(law), stability(on_arm), sampled_brief(on_arm))
-            )
+            value = judge.value(law)
+            on_arms.append(OnArm(name, numbers, value, stability(on_arm), sampled_brief(on_arm)))
         at_ends = own.at_ends(x)
+        physical = own.ends(physical=True)
         return Design(
             objective=self.objective,
             structure=own.name,
             law=law,
-            coefficients=own.fixed | dict(zip(own.names, own.coefficients(x).tolist(), strict=True)),
+            coefficients=own.by_name(own.coefficients(x).tolist()),
             value=OBJECTIVES[self.objective].worst([each.value for each in on_arms]),
             verdict=on_arms[0].verdict,
             bounds={each.name: each.bounds for each in own.free},
             flat=flat_part(choice.worst, own, x, choice.score),
             modes=self.modes,
             at_bound=tuple(own.names[place] for place, _ in at_ends),
-            at_limit=tuple(
-                own.names[place] for place, end in at_ends if (place, end) in own.ends(physical=True)
-            ),
+            at_limit=tuple(own.names[place] for place, end in at_ends if (place, end) in physical),
             widened=choice.search.widened,
             loop="continuous" if self.continuous else "sampled",
             chain=self.chain,
@@ -395,7 +395,7 @@ class _DesignTask:
 
 
 def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Chain | None, size: int) -> str:
-    """The most unstable mode under the law nearest to stability (of a sampled loop), what was searched, and a remedy.
+    """Return the most unstable mode under the law nearest to stability when sampled, the bounds, and a remedy.
 
     `size` is the number of modes of the largest model.
     """
@@ -403,9 +403,8 @@ def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Cha
     text = f"no law {form.name} with {within} was found that is stable"
     if chain is None:
         return f"{text}: widen the bounds"
-    verdict = max(
-        (sampled_verdict(Case(each.arm, law, chain)) for each in arms), key=lambda each: each.log_radius
-    )
+    verdicts = [sampled_verdict(Case(each.arm, law, chain)) for each in arms]
+    verdict = max(verdicts, key=attrgetter("log_radius"))
     growth = np.expm1(verdict.log_radius)
     nearest = f"{verdict.slowest} grows by {growth:.2g} a sample" if growth > 0 else "there is no reserve"
     remedy = f"widen the bounds, or try another {ANGLE_GAIN} or period"

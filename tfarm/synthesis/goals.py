@@ -150,7 +150,9 @@ def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real) -> tuple[flo
     low, high = form.box
     edges = np.diag(np.where(x + 0.02 * (high - low) > high, -1.0, 1.0) * 0.02 * (high - low))
     options = {"initial_simplex": [x, *(x + edges)], "maxfev": 60 * form.size, "adaptive": form.size > 2}
-    done = cast("Any", minimize)(score, x, method="Nelder-Mead", bounds=np.transpose(form.box), options=options)
+    done = cast("Any", minimize)(
+        score, x, method="Nelder-Mead", bounds=np.transpose(form.box), options=options
+    )
     return float(done.fun), np.asarray(done.x)
 
 
@@ -176,7 +178,11 @@ def _values_of(card: LoopCard) -> dict[str, float]:
         "delay_margin_periods": _or(card.delay_margin_periods, -np.inf),
         "peak_sensitivity": _or(card.peak_sensitivity.value, np.inf),
         "disk_margin": _or(card.disk_margin, -np.inf),
-        "least_damping": -np.inf if card.stability != "stable" else 1.0 if damping is None else float(damping.ratio),
+        "least_damping": -np.inf
+        if card.stability != "stable"
+        else 1.0
+        if damping is None
+        else float(damping.ratio),
         "time_constant_s": _or(card.time_constant, np.inf),
     }
 
@@ -209,8 +215,12 @@ class Checked(NamedTuple):
     requirement: Annotated[str, Quantity("requirement", help="as after --require")]
     arm: Annotated[str, Quantity("arm", help="the arm")]
     sampled: Annotated[float | None, Quantity("sampled", digits=4, help="exact value of the sampled loop")]
-    continuous: Annotated[float | None, Quantity("continuous-time", digits=4, help="of the continuous-time loop")]
-    violation: Annotated[float, Quantity("violation", digits=2, help="excess over the limit in units of the limit")]
+    continuous: Annotated[
+        float | None, Quantity("continuous-time", digits=4, help="of the continuous-time loop")
+    ]
+    violation: Annotated[
+        float, Quantity("violation", digits=2, help="excess over the limit in units of the limit")
+    ]
 
 
 def check(goal: Goal, judge: Any, named: NamedArm, law: AnyLaw) -> tuple[list[Checked], Real]:

@@ -37,10 +37,8 @@ from tfarm.loop.sampled_verdict import UNDAMPED_MODES, sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.records import frozen
 from tfarm.synthesis.models import DesignModel, Slews, continuous_model, sampled_model, slew_and_after
-from tfarm.synthesis.structures import Entry
+from tfarm.synthesis.structures import Entry, polynomial_of
 
-# samples, or s: the longest delay margin, and that where |L| is nowhere 1
-LONGEST_MARGIN = 100.0
 # factor on all gains with which the loop is stable, up and down: the error of a gauge or motor
 RESERVE = 1.25
 # score where a loop is unstable, and as much for each later condition: above any value in SI units
@@ -48,7 +46,7 @@ LOST = 1e30
 
 
 def damping_of(model: DesignModel, poles: Complex) -> Real:
-    """The least damping ratio (laws,) of oscillating poles (laws, n); 1 where a law has none.
+    """Return the least damping ratio (laws,) of oscillating poles (laws, n); 1 where a law has none.
 
     One of each pair counts.  The poles nearest to those of `higher` modes are left out.
     """
@@ -66,12 +64,12 @@ def damping_of(model: DesignModel, poles: Complex) -> Real:
 
 
 def disk_of(L: Complex) -> Real:
-    """2 |1 + L|/|1 - L|."""
+    """Return 2 |1 + L|/|1 - L|."""
     return 2 * abs(1 + L) / np.maximum(abs(1 - L), LEAST_SIZE)
 
 
 def delay(model: DesignModel, L: Complex) -> Real:
-    """The delay [s] that turns L to -1 where |L| passes 1, between two points of the grid along straight lines.
+    """Return the delay [s] that turns L to -1 where |L| passes 1, along straight lines between points of the grid.
 
     A law is without limit where `RESERVE` L passes 1 nowhere either: a resonance peaks between two points of the grid.
     """
@@ -80,12 +78,12 @@ def delay(model: DesignModel, L: Complex) -> Real:
 
 
 def longest_delay(model: DesignModel) -> float:
-    """The longest delay [s] that is looked for."""
-    return (model.period or 1.0) * LONGEST_MARGIN
+    """Return the longest delay [s] that is looked for: 100 samples, or 100 s; that where |L| is nowhere 1."""
+    return 100.0 * (model.period or 1.0)
 
 
 def _passing_delay(model: DesignModel, L: Complex) -> Real:
-    """That delay [s] by the passages between points of the grid alone, at most the longest."""
+    """Return that delay [s] by the passages between points of the grid alone, at most the longest."""
     q = model.angles
     around = 2 * np.pi
     size = np.log(np.maximum(abs(L), LEAST_SIZE))
@@ -96,7 +94,8 @@ def _passing_delay(model: DesignModel, L: Complex) -> Real:
     share = here / np.where(passes, -change, 1.0)
     step = np.mod(np.diff(turn) + np.pi, around) - np.pi
     late = np.mod(turn[:, :-1] + share * step, around) / (q[:-1] + share * np.diff(q))
-    return (model.period or 1.0) * np.where(passes, late, LONGEST_MARGIN).min(axis=1, initial=LONGEST_MARGIN)
+    longest = longest_delay(model)
+    return np.where(passes, (model.period or 1.0) * late, longest).min(axis=1, initial=longest)
 
 
 class Objective(NamedTuple):
@@ -113,7 +112,7 @@ class Objective(NamedTuple):
     of_poles: bool = False
 
     def worst(self, values: Sequence[float]) -> float:
-        """The worst of its values."""
+        """Return the worst of its values."""
         return min(values) if self.is_negated else max(values)
 
 
@@ -121,14 +120,13 @@ class Objective(NamedTuple):
 class Judge:
     """The objective of laws on an arm, by a `model` of few modes; the models `also` have to be stable, too.
 
-    Slews are those of the arm `known`, and damping is that of the first `modes` modes.
+    Slews are those of the arm `known`.
     """
 
     arm: Arm
     known: Arm
     chain: Chain
     objective: Objective
-    modes: int
     model: DesignModel
     also: tuple[DesignModel, ...]
     delayed: tuple[DesignModel, ...] = ()
@@ -151,30 +149,34 @@ class Judge:
         """
         # edges of the model's few modes have a smaller error
         reserve = 1.002 * RESERVE
-        shares = (reserve, 1 / reserve) * self.is_sampled + (1.0,) * (not self.objective.of_poles)
-        return [*((self.model, share) for share in shares), *((each, 1.0) for each in self.also)]
+        found = []
+        if self.is_sampled:
+            found += [(self.model, reserve), (self.model, 1 / reserve)]
+        if not self.objective.of_poles:
+            found.append((self.model, 1.0))
+        return found + [(each, 1.0) for each in self.also]
 
     def case(self, law: AnyLaw) -> Case:
-        """The case of a law on the arm."""
+        """Return the case of a law on the arm."""
         return Case(self.arm, law, self.chain)
 
     # ------------------------------------------------------------ in the model
 
     def entries(self, law: AnyLaw) -> list[Entry]:
-        """The entries of a law of rational blocks, one for each signal."""
-        blocks = [(part.signals[0], part.block) for part in self.case(law).law.parts]
-        return [
-            Entry(name, np.array(block.num)[:, None], np.array(block.den)[:, None])
-            for name, block in blocks
-            if isinstance(block, Rational)
-        ]
+        """Return the entries of a law of rational blocks, one for each signal."""
+        entries = []
+        for part in self.case(law).law.parts:
+            block = part.block
+            if isinstance(block, Rational):
+                entries.append(Entry(part.signals[0], polynomial_of(*block.num), polynomial_of(*block.den)))
+        return entries
 
     def score(self, law: AnyLaw) -> float:
-        """The function to be minimised, of one law."""
+        """Return the function to be minimised, of one law."""
         return float(scores_of([self], self.entries(law), np.array([np.inf]))[0])
 
     def aims(self, entries: Sequence[Entry]) -> Real:
-        """The objective by the judge's own model alone; of its poles `LOST` and more where one is unstable."""
+        """Return the objective by the judge's own model alone; of its poles `LOST` and more where one is unstable."""
         if not self.objective.of_poles:
             # slews of unstable laws
             with np.errstate(all="ignore"):
@@ -184,34 +186,34 @@ class Judge:
         scores = lost(1, growth)
         stable = growth < 0
         if stable.any():
-            scores[stable] = self.objective.scores(self, chosen(entries, stable), poles[stable])
+            scores[stable] = self.objective.scores(self, of_laws(entries, stable), poles[stable])
         return scores
 
     # ------------------------------------------------------------ beyond it
 
     def value(self, law: AnyLaw) -> float:
-        """The objective of one law, by the best available method."""
+        """Return the objective of one law, by the best available method."""
         return self.objective.value(self, law)
 
     def disk_margin(self, law: AnyLaw) -> float:
-        """The disk margin, between the points of the grid too."""
+        """Return the disk margin, between the points of the grid too."""
         return self._lowest(law, disk_of)
 
     def peak_sensitivity(self, law: AnyLaw) -> float:
-        """The largest |S|, likewise."""
+        """Return the largest |S|, likewise."""
         return float(self.peak(self._lowest(law, lambda L: np.asarray(abs(1 + L)))))
 
     def _lowest(self, law: AnyLaw, of: Callable[[Complex], Real]) -> float:
-        """The least of a function of the loop function."""
+        """Return the least of a function of the loop function."""
         entries = self.entries(law)
         return lowest(lambda angles: of(self.model.loop(entries, angles)[0]), self.model.angles)[0]
 
     def peak(self, distance: Any) -> Any:
-        """The largest |S| of the least |1 + L|; in continuous time at least 1, as L -> 0 beyond the grid."""
+        """Return the largest |S| of the least |1 + L|; in continuous time at least 1, as L -> 0 beyond the grid."""
         return np.maximum(1 / np.maximum(distance, LEAST_SIZE), 0.0 if self.is_sampled else 1.0)
 
     def exact_damping(self, law: AnyLaw) -> float:
-        """The least damping ratio; of the continuous-time loop that of its exact poles."""
+        """Return the least damping ratio; of the continuous-time loop that of its exact poles."""
         if self.is_sampled:
             return -self.score(law)
         s = stability(self.case(law), self.model.band).poles.values
@@ -219,40 +221,39 @@ class Judge:
         return float((-s.real / abs(s)).min(initial=1.0))
 
     def delay_margin(self, law: AnyLaw) -> float:
-        """The delay margin [s] by the model; a lower bound where it is the longest that is looked for."""
+        """Return the delay margin [s] by the model; a lower bound where it is the longest that is looked for."""
         late = float(delay(self.model, self.model.loop(self.entries(law)))[0])
         return late if late < longest_delay(self.model) else LowerBound(late)
 
     def simulated_residual(self, law: AnyLaw) -> float:
-        """The residual of `tfarm simulate` after the slew [N m], with the converters; inf where it stops."""
+        """Return the residual of `tfarm simulate` after the slew [N m], with the converters; inf where it stops."""
         if not self.is_sampled:
             return self.score(law)
         case = self.case(law)
         run, _ = simulate_modes(case, slew_and_after(case.arm, self.known, case.chain))
         return np.inf if run.residual_moment is None else run.residual_moment
 
-    def holds(self, law: AnyLaw) -> bool:
-        """Whether the loop is stable by the exact verdicts, when sampled also with a reserve."""
-        shares = (1.0, 1 / RESERVE, RESERVE) if self.is_sampled else ()
-        cases = (self.case(law.times(share)) for share in shares)
+    def is_stable(self, law: AnyLaw) -> bool:
+        """Return whether the loop is stable by the exact verdicts, when sampled also with a reserve."""
         try:
-            return stability(self.case(law)).is_stable and all(
-                sampled_verdict(each).is_stable for each in cases
-            )
+            if not stability(self.case(law)).is_stable:
+                return False
+            shares = (1.0, 1 / RESERVE, RESERVE) if self.is_sampled else ()
+            return all(sampled_verdict(self.case(law.times(share))).is_stable for share in shares)
         except ConvergenceError:
             # a pole on the axis or the circle
             return False
 
 
 def delay_score(judge: Judge, entries: Sequence[Entry], poles: Complex) -> Real:
-    """Minus the delay margin, times 1 + damping ratio at the longest one, so that damping decides among such laws."""
+    """Return minus the delay margin, at the longest one times 1 + damping ratio, which decides among such laws."""
     late = delay(judge.model, judge.model.loop(entries))
     is_longest = late >= longest_delay(judge.model)
     return np.where(is_longest, -late * (1 + damping_of(judge.model, poles)), -late)
 
 
 def disk_score(judge: Judge, entries: Sequence[Entry], poles: Complex) -> Real:
-    """Minus the disk margin, and a little of the damping ratio: without sampling all rate feedback has margin 2."""
+    """Return minus the disk margin and a little of the damping: without sampling all rate feedback has margin 2."""
     return -disk_of(judge.model.loop(entries)).min(axis=1) - 1e-3 * damping_of(judge.model, poles)
 
 
@@ -277,22 +278,29 @@ OBJECTIVES = {
 
 
 def model_sizes(arm: Arm, chain: Chain, modes: int, *, continuous: bool) -> list[int]:
-    """Numbers of flexible modes of the models of a search, in turn until the best law is stable.
+    """Return numbers of flexible modes of the models of a search, in turn until the best law is stable.
 
     Without damping there is one, that of the sampled verdict.
     """
     # of the first model; more where its best laws are unstable
     fewest_modes = 8
     fewest = modes + fewest_modes // 2
-    if continuous or arm.has_elastic_link:
-        return [max(fewest_modes if continuous else UNDAMPED_MODES, fewest)]
+    if continuous:
+        return [max(fewest_modes, fewest)]
+    if arm.has_elastic_link:
+        return [max(UNDAMPED_MODES, fewest)]
     # with twice as many modes a law takes eight times as long
     most = min(most_modes(arm, chain), 32)
-    doubled = (max(fewest_modes, fewest) << n for n in range(most.bit_length()))
-    return [*(size for size in doubled if size < most), most]
+    sizes = []
+    size = max(fewest_modes, fewest)
+    while size < most:
+        sizes.append(size)
+        size *= 2
+    return [*sizes, most]
 
 
-@lru_cache(64)  # those of the arms inside a box, which are the same in each exchange
+# those of the arms inside a box, which are the same in each exchange
+@lru_cache(64)
 def judge_of(
     arm: Arm,
     known: Arm,
@@ -304,36 +312,38 @@ def judge_of(
     *,
     continuous: bool = False,
 ) -> Judge:
-    """The judge of laws on these signals, with `count` flexible modes; more of the continuous-time loop."""
+    """Return the judge of laws on these signals, with `count` flexible modes; more of the continuous-time loop."""
     aim = OBJECTIVES[objective] if isinstance(objective, str) else objective
-    signals = tuple(dict.fromkeys((*signals, *("root_moment",) * aim.of_slew)))
+    if aim.of_slew and "root_moment" not in signals:
+        signals = (*signals, "root_moment")
     known, _ = arm_under_chain(known, chain)
     arm, chain = arm_under_chain(arm, chain)
-    own = continuous_model(arm, signals, modes, (2 if continuous else 1) * count, 2 / chain.sampling.period)
+    speed = 2 / chain.sampling.period
     if continuous:
-        return Judge(arm, known, chain, aim, modes, own, ())
-    return Judge(arm, known, chain, aim, modes, sampled_model(arm, chain, signals, modes, count), (own,))
+        model = continuous_model(arm, signals, modes, 2 * count, speed)
+        return Judge(arm, known, chain, aim, model, ())
+    model = sampled_model(arm, chain, signals, modes, count)
+    return Judge(arm, known, chain, aim, model, (continuous_model(arm, signals, modes, count, speed),))
 
 
 def lost(stage: int, growth: Real) -> Real:
-    """Scores of laws with a growth (laws,) of their fastest pole, above those of laws lost at a later stage."""
+    """Return scores of laws with a growth (laws,) of their fastest pole, above those of laws lost later."""
     return LOST * (stage + growth / (1 + abs(growth)))
 
 
 def scores_of(judges: Sequence[Judge], entries: Sequence[Entry], limits: Real) -> Real:
-    """The largest score of laws by any judge; `LOST` and more where a loop is unstable.
+    """Return the largest score of laws by any judge; `LOST` and more where a loop is unstable.
 
     A law whose score is above its one of the `limits` (laws,) may have any value above it.  Where the limit is the
     score of a stable law, the objective is first: most laws have lost by it.
     """
     scores = np.full(limits.size, -np.inf)
-    of_stable = limits < LOST
-    _add_aims(judges, entries, of_stable, scores, limits)
+    _add_aims(judges, entries, limits < LOST, scores, limits)
     left = np.flatnonzero(scores <= limits)
     conditions = [each for judge in judges for each in judge.conditions]
     for stage, (model, share) in enumerate(conditions, -len(conditions)):
         if left.size:
-            growth = model.growth(model.poles(chosen(entries, left), share)).max(axis=1)
+            growth = model.growth(model.poles(of_laws(entries, left), share)).max(axis=1)
             scores[left[growth >= 0]] = lost(1 - stage, growth[growth >= 0])
             left = left[growth < 0]
     _add_aims(judges, entries, np.isneginf(scores), scores, limits)
@@ -347,12 +357,9 @@ def _add_aims(
     for judge in judges:
         left = np.flatnonzero(which & (scores <= limits) & (scores < LOST))
         if left.size:
-            scores[left] = np.maximum(scores[left], judge.aims(chosen(entries, left)))
+            scores[left] = np.maximum(scores[left], judge.aims(of_laws(entries, left)))
 
 
-def chosen(entries: Sequence[Entry], rows: Any) -> list[Entry]:
-    """The entries of some of the laws; polynomials that are common to all laws stay."""
-    return [
-        Entry(each.signal, *(of[:, rows] if of.shape[1] > 1 else of for of in (each.num, each.den)))
-        for each in entries
-    ]
+def of_laws(entries: Sequence[Entry], laws: Any) -> list[Entry]:
+    """Return the entries of some of the laws."""
+    return [each.of_laws(laws) for each in entries]

@@ -58,7 +58,7 @@ class DesignModel:
     # ------------------------------------------------------------ laws in states
 
     def states(self, entries: Sequence[Entry]) -> Matrices:
-        """A (laws, k, k), B (laws, k, signals), C (laws, 1, k), D (laws, 1, signals) of laws."""
+        """Return A (laws, k, k), B (laws, k, signals), C (laws, 1, k), D (laws, 1, signals) of laws."""
         number = max(each.num.shape[1] for each in entries)
         order = sum(len(each.den) - 1 for each in entries)
         signals = len(self.signals)
@@ -89,15 +89,15 @@ class DesignModel:
         return within @ (unit + A), 2 * within @ B, C @ within, D + C @ within @ B
 
     def feedback(self, law: Matrices, share: float = 1.0) -> tuple[Real, Real]:
-        """The row (laws, 1, n) of the input by all states, with a factor on the law, and 1 + D_k D (nan for 0)."""
+        """Return the row (laws, 1, n) of the input by all states, under a factor on the law, and 1 + D_k D or nan."""
         _, _, C, D = self.plant
         _, _, Ck, Dk = law
         through = 1.0 + share * (Dk @ D)
         through = np.where(abs(through) < ALGEBRAIC, np.nan, through)
         return -share * np.concatenate([Dk @ C, Ck], axis=2) / through, through
 
-    def closed(self, law: Matrices, share: float = 1.0) -> Real:
-        """Closed-loop matrices (laws, n, n), the plant's states first; nan of algebraic loops."""
+    def closed_matrices(self, law: Matrices, share: float = 1.0) -> Real:
+        """Return closed-loop matrices (laws, n, n), the plant's states first; nan of algebraic loops."""
         A, B, C, D = self.plant
         Ak, Bk, *_ = law
         row, _ = self.feedback(law, share)
@@ -105,7 +105,8 @@ class DesignModel:
         n = len(A)
         read[:, :, :n] += C
         found = np.zeros((len(Ak), *row.shape[-1:] * 2))
-        found[:, :n, :n], found[:, n:, n:] = A, Ak
+        found[:, :n, :n] = A
+        found[:, n:, n:] = Ak
         found[:, :n] += B @ row
         found[:, n:] += Bk @ read
         return found
@@ -113,20 +114,22 @@ class DesignModel:
     # ------------------------------------------------------------ poles
 
     def poles(self, entries: Sequence[Entry], share: float = 1.0) -> Complex:
-        """Closed-loop poles (laws, n), of a matrix that is not finite far outside."""
-        found = self.closed(self.states(entries), share)
+        """Return closed-loop poles (laws, n), of a matrix that is not finite far outside."""
+        found = self.closed_matrices(self.states(entries), share)
         growth = 1e6
         found[~np.isfinite(found).all(axis=(1, 2))] = growth * np.eye(found.shape[1])
         return np.linalg.eigvals(found).astype(complex)
 
     def growth(self, poles: Complex) -> Real:
-        """ln |z| of poles, or Re s/|s| less the error of the model: below 0 if stable."""
+        """Return ln |z| of poles, or Re s/|s| less the error of the model: below 0 if stable."""
         size = np.maximum(abs(poles), LEAST_SIZE)
+        if self.period is not None:
+            return np.log(size)
         # a smaller growth may be an error of the model
-        return np.log(size) if self.period is not None else poles.real / size - 1e-6
+        return poles.real / size - 1e-6
 
     def in_s(self, poles: Complex) -> Complex:
-        """s of poles, times the period of a sampled loop; 1 of poles at z = 0."""
+        """Return s of poles, times the period of a sampled loop; 1 of poles at z = 0."""
         if self.period is None:
             return poles
         return np.log(np.where(poles == 0, np.e, poles))
@@ -144,9 +147,12 @@ class DesignModel:
         return self.response(self.angles)
 
     def loop(self, entries: Sequence[Entry], angles: Real | None = None) -> Complex:
-        """L (laws, m) at the model's own angles, or at others."""
-        q = self.angles if angles is None else np.asarray(angles)
-        response = self.responses if angles is None else self.response(q)
+        """Return L (laws, m) at the model's own angles, or at others."""
+        q = self.angles
+        response = self.responses
+        if angles is not None:
+            q = np.asarray(angles)
+            response = self.response(q)
         s = 1j * q
         if self.period is not None:
             z = np.exp(s)
@@ -161,7 +167,7 @@ class DesignModel:
 
 
 def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int, speed: float) -> DesignModel:
-    """The continuous-time loop of `count` flexible modes; its response is that of the exact arm."""
+    """Return the continuous-time loop of `count` flexible modes; its response is that of the exact arm."""
     A, B, C, D = sensed_model(arm, signals, count)
     # an angle without feedback is no state of the loop
     if arm.has_rigid_mode and "hub_angle" not in signals:
@@ -186,29 +192,35 @@ def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int,
 
 
 def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, count: int) -> DesignModel:
-    """The loop at the samples of a chain, of `count` flexible modes.
+    """Return the loop at the samples of a chain, of `count` flexible modes.
 
     Poles of higher modes, which alias into the same angles, are those nearest to the open-loop ones: a held torque
     moves a pole less the higher its mode.
     """
     T = chain.sampling.period
     by_difference = "hub_rate" in signals and chain.converters.hub_rate == "difference"
-    read = tuple(dict.fromkeys((*signals, *("hub_angle",) * by_difference)))
+    read = signals
+    if by_difference and "hub_angle" not in signals:
+        read = (*signals, "hub_angle")
     sensed = sensed_plant(arm, chain, read, count)
     pulse = PulseTransfer(sensed.together, chain.sampling).folded()
     A, B, C = pulse.matrices()
     own = sensed.own_moment(chain.sampling) if "root_moment" in signals else 0.0 * C[0]
     # of the two states of the rigid body those that the loop does not have; of an arm that turns the angle is the last
     first = pulse.integrals_at
-    damped = bool(sensed.read.arm.rate_loss)
-    turns = arm.has_rigid_mode
-    gone = range(first, first + (damped + ("hub_angle" not in signals) if turns else 2))
+    angle = None
+    missing = 2
+    if arm.has_rigid_mode:
+        damped = bool(sensed.read.arm.rate_loss)
+        angle = first + damped
+        missing = damped + ("hub_angle" not in signals)
+    gone = range(first, first + missing)
     response: Callable[[Complex], Complex] = pulse
     if by_difference:
         a = np.exp(-chain.converters.rate_filter * T)
         n = read.index("hub_angle")
         row = signals.index("hub_rate")
-        A, B, C = difference_rate(A, B, C, n, row, a, T, first + damped if turns else None)
+        A, B, C = difference_rate(A, B, C, n, row, a, T, angle)
         own = np.append(own, 0.0)
 
         def response(z: Complex) -> Complex:
@@ -231,7 +243,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         lambda q: response(np.exp(1j * q))[: len(signals)],
         np.inf,
         tuple(complex(each.real, abs(each.imag)) for each in higher),
-        first + 2 - len(gone),
+        first + 2 - missing,
         np.delete(own, gone),
     )
 
@@ -239,7 +251,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
 def difference_rate(
     A: Real, B: Real, C: Real, angle: int, rate: int, a: float, T: float, state: int | None
 ) -> tuple[Real, Real, Real]:
-    """The plant with the rate as the filtered difference of the angle, (1 - a)/T (z - 1)/(z - a).
+    """Return the plant with the rate as the filtered difference of the angle, (1 - a)/T (z - 1)/(z - a).
 
     It has one more state g, a g + theta of the next sample, less its share of the turning `state`.  `angle` and `rate`
     are rows; only the angle depends on that state then.
@@ -264,11 +276,12 @@ def difference_rate(
 
 
 def circle_angles(pulse: PulseTransfer) -> Real:
-    """Angles (0, pi] of the circle, dense near the poles of the open loop."""
+    """Return angles (0, pi] of the circle, dense near the poles of the open loop."""
     angle = abs(np.angle(pulse.multipliers))
     away = np.geomspace(1e-9, 0.5, 40)
     close = (angle[:, None] + np.r_[-away, away]).ravel()
-    return np.unique(np.r_[np.linspace(0, np.pi, 401)[1:], close[(close > 0) & (close <= np.pi)]])
+    found = np.unique(np.r_[np.linspace(0, np.pi, 401), close])
+    return found[(found > 0) & (found <= np.pi)]
 
 
 class Blocks(NamedTuple):
@@ -285,7 +298,7 @@ class Blocks(NamedTuple):
 
 
 def in_blocks(signals: Real, first: int) -> Blocks:
-    """The signals (inputs, samples) in blocks, before them zeros so that the sample `first` begins one.
+    """Return the signals (inputs, samples) in blocks, before them zeros so that the sample `first` begins one.
 
     Those of a slew are polynomials over each half: the blocks have a low rank, whatever their number.
     """
@@ -305,7 +318,7 @@ def in_blocks(signals: Real, first: int) -> Blocks:
 
 
 def squares(A: Real, B: Real, C: Real, D: Real, signals: Blocks) -> Real:
-    """The sum of squares (laws,) of C x_k + D r_k over the counted samples, x_{k+1} = A x_k + B r_k from x = 0.
+    """Return the sum of squares (laws,) of C x_k + D r_k over the counted samples, x_{k+1} = A x_k + B r_k from x = 0.
 
     The outputs of a block are one product with its first state and the shares of its signals.
     """
@@ -340,19 +353,15 @@ def squares(A: Real, B: Real, C: Real, D: Real, signals: Blocks) -> Real:
     return (outputs**2).sum(axis=(1, 2))
 
 
-# of the period after the slew, in continuous time
-PERIOD_POINTS = 64
-
-
 def slew_and_after(arm: Arm, known: Arm, chain: Chain) -> Scenario:
-    """The slew for the arm `known`, and a period of the first mode of the moving arm."""
+    """Return the slew for the arm `known`, and a period of the first mode of the moving arm."""
     # where a period of the first mode has fewer samples
     left = max(2 * np.pi / first_frequency(arm), 16 * chain.sampling.period)
     return scenario("slew", known, chain, chain.slew.rise_time + left)
 
 
 def trial_slew(known: Arm, chain: Chain) -> Scenario:
-    """The slew of the tuner's trials for the arm `known`."""
+    """Return the slew of the tuner's trials for the arm `known`."""
     return scenario("slew", known, chain, TRIAL_SLEWS * chain.slew.rise_time)
 
 
@@ -366,26 +375,26 @@ class Slews:
     chain: Chain
 
     def residual(self, entries: Sequence[Entry]) -> Real:
-        """Root mean square [N m] of the arm's own moment less the rigid arm's (laws,)."""
+        """Return the root mean square [N m] of the arm's own moment less the rigid arm's (laws,)."""
         if self.model.period is None:
             return np.sqrt(self._mean_square_in_time(entries))
-        A, B, C, D = self._driven(entries, 1)
+        A, B, C, D = self._closed_loop(entries, 1)
         D[:, 0, -1] -= 1.0
         return np.sqrt(squares(A, B, C, D, self._after) / self._after.counted)
 
     def cost(self, entries: Sequence[Entry]) -> Real:
-        """T sum of (a x^2 + b e^2)/2 (laws,)."""
+        """Return T sum of (a x^2 + b e^2)/2 (laws,)."""
         model = self.model
-        A, B, *_ = self._driven(entries, 2)
+        A, B, *_ = self._closed_loop(entries, 2)
         C = np.zeros((len(A), 2, A.shape[1]))
         D = np.zeros((len(A), 2, B.shape[2]))
         read = model.plant[2][model.signals.index("root_moment")]
-        C[:, 0, : read.size], C[:, 1] = read, A[:, model.last]
+        C[:, 0, : read.size] = read
+        C[:, 1] = A[:, model.last]
         D[:, 1] = B[:, model.last]
         D[:, (0, 1), (-2, -1)] = -1.0
-        weights = np.sqrt(np.array(trial_weights(self.known, self.chain)) * self.chain.sampling.period / 2)[
-            :, None
-        ]
+        T = self.chain.sampling.period
+        weights = np.sqrt(np.array(trial_weights(self.known, self.chain)) * T / 2)[:, None]
         return squares(A, B, weights * C, weights * D, self._trial)
 
     @cached_property
@@ -402,12 +411,12 @@ class Slews:
         return in_blocks(self._signals(task, task.moment_reference, own), 0)
 
     def _signals(self, task: Scenario, *wanted: Real) -> Real:
-        """The feed-forward, the references, and signals that are wanted."""
+        """Return the feed-forward, the references, and signals that are wanted."""
         references = (task.references.get(name, 0.0 * task.t) for name in self.model.signals)
         return np.array([task.feedforward, *references, *wanted])
 
-    def _driven(self, entries: Sequence[Entry], wanted: int) -> Matrices:
-        """The closed loop from the feed-forward, the references and signals that are wanted to the arm's own moment."""
+    def _closed_loop(self, entries: Sequence[Entry], wanted: int) -> Matrices:
+        """Return the closed loop from feed-forward, references and signals that are wanted to the arm's own moment."""
         model = self.model
         _, B, _, D = model.plant
         law = model.states(entries)
@@ -420,23 +429,24 @@ class Slews:
         own = D[model.signals.index("root_moment")]
         C = own * row
         C[..., : len(B)] += model.own_moment
-        return model.closed(law), np.concatenate([B @ push, Bk @ error], axis=1), C, own * push
+        return model.closed_matrices(law), np.concatenate([B @ push, Bk @ error], axis=1), C, own * push
 
     def _mean_square_in_time(self, entries: Sequence[Entry]) -> Real:
-        """The mean square (laws,) of the moment over the first mode's period after the slew.
+        """Return the mean square (laws,) of the moment over the first mode's period after the slew.
 
         The rigid arm's is 0 then.  Angle and rate have references here, the moment has none.  Of the reference angle,
         rate and acceleration are states of their own: the acceleration is constant over each half of the slew.
         """
         slew = self.chain.slew
-        A, B, C, D = self._driven(entries, 0)
+        A, B, C, D = self._closed_loop(entries, 0)
         # the feed-forward and the references by angle, rate and acceleration
         followed = {"hub_angle": (1.0, 0.0, 0.0), "hub_rate": (0.0, 1.0, 0.0)}
         forward = (0.0, self.known.rate_loss, self.known.turned_inertia)
         signals = np.array([forward, *(followed.get(name, (0.0, 0.0, 0.0)) for name in self.model.signals)])
         size = A.shape[1]
         whole = np.zeros((len(A), size + 3, size + 3))
-        whole[:, :size, :size], whole[:, :size, size:] = A, B @ signals
+        whole[:, :size, :size] = A
+        whole[:, :size, size:] = B @ signals
         whole[:, size:, size:] = np.eye(3, k=1)
         half = expm(whole * slew.rise_time / 2)
         x = np.zeros((len(A), size + 3, 1))
@@ -444,10 +454,12 @@ class Slews:
             x[:, -1] = way * slew.acceleration(self.known.reach)
             x = half @ x
         x[:, -2:] = 0.0
-        step = expm(whole * (2 * np.pi / first_frequency(self.arm) / PERIOD_POINTS))
+        # of the period after the slew
+        points = 64
+        step = expm(whole * (2 * np.pi / first_frequency(self.arm) / points))
         sense = np.concatenate([C, D @ signals], axis=2)
         total = np.zeros(len(A))
-        for _ in range(PERIOD_POINTS):
+        for _ in range(points):
             total += (sense @ x)[:, 0, 0] ** 2
             x = step @ x
-        return total / PERIOD_POINTS
+        return total / points

@@ -56,7 +56,10 @@ class Sensitivity(NamedTuple):
     requirement: Annotated[str, Quantity("requirement", help="as after --require")]
     coefficient: Annotated[str, Quantity("coefficient", help="a number of the law")]
     change: Annotated[
-        float, Quantity("change per 1 %", digits=3, help="of the quantity, sampled loop, per 1 % of the coefficient")
+        float,
+        Quantity(
+            "change per 1 %", digits=3, help="of the quantity, sampled loop, per 1 % of the coefficient"
+        ),
     ]
 
 
@@ -140,7 +143,9 @@ class RequirementTask:
                 break
             if not np.isfinite(violations).all():
                 # unstable by a mode that the models leave out
-                if step + 1 >= max(len(model_sizes(each.arm, self.chain, self.modes, continuous=False)) for each in named):
+                if step + 1 >= max(
+                    len(model_sizes(each.arm, self.chain, self.modes, continuous=False)) for each in named
+                ):
                     break
                 step += 1
                 continue

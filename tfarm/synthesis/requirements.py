@@ -99,7 +99,9 @@ def measure_named(word: str, key: str) -> str:
     return _NAMES[word]
 
 
-def requirements_of(wanted: str | Mapping[str, float | str] | Sequence[Requirement]) -> tuple[Requirement, ...]:
+def requirements_of(
+    wanted: str | Mapping[str, float | str] | Sequence[Requirement],
+) -> tuple[Requirement, ...]:
     """Return the requirements of a text, a table, or a sequence of them.
 
     A text is a list such as "GM>=6, PM>=45, damping>=2%"; "good" stands for the limits of the grade.  A table has a limit
@@ -110,7 +112,10 @@ def requirements_of(wanted: str | Mapping[str, float | str] | Sequence[Requireme
         texts = [each.strip() for each in wanted.split(",")]
         found = [each for text in texts for each in (GOOD if text == "good" else (_of_text(text),))]
     elif isinstance(wanted, Mapping):
-        found = [_of_text(f"{name}{MEASURES[measure_named(name, 'require')].sense}{limit}") for name, limit in wanted.items()]
+        found = [
+            _of_text(f"{name}{MEASURES[measure_named(name, 'require')].sense}{limit}")
+            for name, limit in wanted.items()
+        ]
     else:
         found = list(wanted)
     last = {each.name: each for each in found}
@@ -127,7 +132,12 @@ def _of_text(text: str) -> Requirement:
     name = measure_named(word, "require")
     measure = MEASURES[name]
     require(sense == measure.sense, "require", text, f"{measure.title} is limited by {measure.sense}")
-    require(not percent or measure.is_share, "require", text, f"{measure.title} is in {measure.unit or 'units of 1'}")
+    require(
+        not percent or measure.is_share,
+        "require",
+        text,
+        f"{measure.title} is in {measure.unit or 'units of 1'}",
+    )
     try:
         limit = float(number) / (100.0 if percent else 1.0)
     except ValueError:

@@ -26,9 +26,6 @@ from tfarm.synthesis.worst_case import Effort, Tell
 MOST_RUNS = 8
 # of the scores: the spread of a run's points at which it ends
 CONVERGED = 1e-9
-# of x: reach of a search beyond its bounds, a factor e^4 of a coefficient far above its unit
-BEYOND = 4.0
-
 
 # of points (n, k), and of limits
 Score = Callable[..., Real]
@@ -42,9 +39,8 @@ class Points(NamedTuple):
 
     @classmethod
     def of(cls, parts: Sequence[tuple[Real, Real]]) -> Points:
-        """The points of all parts."""
-        x = np.concatenate([each for each, _ in parts], axis=1)
-        scores = np.concatenate([each for _, each in parts])
+        """Return the points of all parts."""
+        x, scores = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
         order = np.argsort(scores, kind="stable")
         return cls(x[:, order], scores[order])
 
@@ -70,24 +66,26 @@ class Worst(NamedTuple):
     @property
     def work(self) -> float:
         """The work of a law, relative to that of one arm and its first model."""
-        squares = sum(
-            (4 if judge.is_sampled else 1) * len(judge.model.plant[0]) ** 2 for judge in self.judges
-        )
+        squares = 0
+        for judge in self.judges:
+            models = 4 if judge.is_sampled else 1
+            squares += models * len(judge.model.plant[0]) ** 2
         # models times squared states of one arm's first model: with twice as much half the runs
         return squares / (4 * 20**2)
 
     def scores(self, form: Structure, x: Real, limits: Real | None = None) -> Real:
-        """The function to be minimised, at points x (n, laws), any value above the limit of a law (see `scores_of`)."""
-        limits = np.full(x.shape[1], np.inf) if limits is None else limits
+        """Return the function to be minimised, at points x (n, laws), any value above the limit of a law."""
+        number = x.shape[1]
+        if limits is None:
+            limits = np.full(number, np.inf)
         # a limit of memory
         at_once = 256
-        parts = (slice(i, i + at_once) for i in range(0, x.shape[1], at_once))
-        return np.concatenate(
-            [
-                scores_of(self.judges, form.entries(form.coefficients(x[:, part])), limits[part])
-                for part in parts
-            ]
-        )
+        found = []
+        for first in range(0, number, at_once):
+            part = slice(first, first + at_once)
+            entries = form.entries(form.coefficients(x[:, part]))
+            found.append(scores_of(self.judges, entries, limits[part]))
+        return np.concatenate(found)
 
 
 def search(
@@ -97,8 +95,10 @@ def search(
 
     `near` (n,) is the best point of a judge with fewer arms, with which the first run begins.
     """
+    # of x: reach of a search beyond its bounds, a factor e^4 of a coefficient far above its unit
+    reach = 4.0
     movable = form.ends(physical=False)
-    region = form.wider(movable, BEYOND)
+    region = form.wider(movable, reach)
     (x, scores), of_runs = minimise_runs(
         partial(judge.scores, region), form, region.box, judge.work, tell, near, effort
     )
@@ -108,14 +108,14 @@ def search(
         # a coefficient is at its physical end if the score there is as good
         if judge.scores(region, moved)[0] <= scores[0] + 1e-4 * abs(scores[0]):
             x[:, :1] = moved
-    beyond = [
-        (place, end) for place, end in movable if (2 * end - 1) * (x[place, 0] - form.box[end][place]) > 0
-    ]
+    low, high = form.box
+    is_beyond = x[:, 0] < low, x[:, 0] > high
+    beyond = [(place, end) for place, end in movable if is_beyond[end][place]]
     widened = tuple(dict.fromkeys(form.names[place] for place, _ in beyond))
-    found = [(float(scores[n]), x[:, n]) for n in _apart(region, x, scores)]
     # a run agrees if its score is worse than the best by less
     agreed = sum(each <= scores[0] + 5e-3 * abs(scores[0]) for each in of_runs)
-    return Search(form.wider(beyond, BEYOND), found, len(of_runs), agreed, widened)
+    found = _best_points(region, x, scores)
+    return Search(form.wider(beyond, reach), found, len(of_runs), agreed, widened)
 
 
 def minimise_runs(
@@ -135,35 +135,40 @@ def minimise_runs(
     all, not of a search near a point, some near the best as long as that gains, and a simplex at the best of all.
     """
     # one run more than coefficients: some minima are found by one of five alone
-    runs = min(max(int((form.size + 1) / max(1.0, work)), 2), MOST_RUNS) if effort == "whole" else 1
+    runs = 1
+    if effort == "whole":
+        runs = min(max(int((form.size + 1) / max(1.0, work)), 2), MOST_RUNS)
     # points of a run: a power of two
     number = 1 << (max(32, 15 * form.size) - 1).bit_length()
     rounds = min(800 * form.size, 4000) // number
     ended: list[Points] = []
 
+    best = np.inf
+
     def run(points: Real, rounds: int) -> None:
+        nonlocal best
         ended.append(evolve_points(score, box, points, rounds, len(ended)))
-        best = min(each.scores[0] for each in ended)
+        best = min(best, ended[-1].scores[0])
         tell(f"{form.name}: search {len(ended)}, best so far {best:.6g}")
 
     for seed in range(MOST_RUNS):
-        if seed >= runs and min(each.scores[0] for each in ended) < LOST:
+        if seed >= runs and best < LOST:
             break
         points = sobol(*form.box, number, seed)
-        points[:, 0] = points[:, 0] if seed else form.origin if near is None else near
+        if seed == 0:
+            points[:, 0] = form.origin if near is None else near
         run(points, rounds)
     runs = len(ended)
     if effort == "whole":
         run(Points.of(ended).x[:, :number], 2 * rounds)
     if form.size > len(PLANE) and effort != "sketch":
         for n in range(5):
-            found = Points.of(ended)
-            least = found.scores[0]
+            before = best
             # the spread of the points of a run around the best, half as wide in each one after
             spread = 0.5 / 2**n * np.random.default_rng(runs + n).standard_normal((number, form.size))
-            run(np.clip(found.x[:, 0] + spread, *box).T, rounds)
+            run(np.clip(Points.of(ended).x[:, 0] + spread, *box).T, rounds)
             # another run follows one with a gain
-            if not ended[-1].scores[0] < least - 2e-3 * abs(least):
+            if not best < before - 2e-3 * abs(before):
                 break
     if effort != "sketch":
         ended.append(simplex(score, box, Points.of(ended)))
@@ -172,10 +177,13 @@ def minimise_runs(
 
 
 def evolve_points(score: Score, box: tuple[Real, Real], points: Real, rounds: int, seed: int) -> Points:
-    """The last points of a run of differential evolution that begins with `points` (n, m)."""
+    """Return the last points of a run of differential evolution that begins with `points` (n, m)."""
     # in turn, and the share of coefficients changed at once
-    strategies = (("best1bin", 0.7), ("currenttobest1bin", 0.9))
-    strategy, recombination = strategies[seed % len(strategies)]
+    strategy = "best1bin"
+    recombination = 0.7
+    if seed % 2:
+        strategy = "currenttobest1bin"
+        recombination = 0.9
     limits = np.full(points.shape[1], np.inf)
 
     def after(intermediate_result: Any) -> None:
@@ -200,7 +208,7 @@ def evolve_points(score: Score, box: tuple[Real, Real], points: Real, rounds: in
 
 
 def simplex(score: Score, box: tuple[Real, Real], found: Points) -> Points:
-    """The last point of a simplex of Nelder and Mead that begins at the best point found."""
+    """Return the last point of a simplex of Nelder and Mead that begins at the best point found."""
     low, high = box
     start = found.x[:, 0]
     limit = found.scores[:1]
@@ -225,27 +233,28 @@ def simplex(score: Score, box: tuple[Real, Real], found: Points) -> Points:
 
 
 def sobol(low: Real, high: Real, number: int, seed: int) -> Real:
-    """Points (n, number) of Sobol's sequence in a box, scrambled by a seed; a power of two has no gap."""
+    """Return points (n, number) of Sobol's sequence in a box, scrambled by a seed; a power of two has no gap."""
     # here, because it takes half a second to load
     from scipy.stats import qmc
 
     return (low + qmc.Sobol(low.size, rng=seed).random(number) * (high - low)).T
 
 
-def _apart(form: Structure, points: Real, scores: Real, most: int = 4, least: float = 0.02) -> list[int]:
-    """Indices of the best points for the exact verdicts, at a least distance from each other, of the range of x."""
+def _best_points(form: Structure, x: Real, scores: Real) -> list[tuple[float, Real]]:
+    """Return the four best points for the exact verdicts, of sorted ones, that differ by 2 % of the range of x."""
     low, high = form.box
-    found: list[int] = []
-    for n in np.argsort(scores, kind="stable").tolist():
-        if (abs(points[:, [n]] - points[:, found]) > least * (high - low)[:, None]).any(axis=0).all():
-            found.append(n)
-        if len(found) == most:
+    least = 0.02 * (high - low)
+    found: list[tuple[float, Real]] = []
+    for score, point in zip(scores.tolist(), x.T, strict=True):
+        if all((abs(point - other) > least).any() for _, other in found):
+            found.append((score, point))
+        if len(found) == 4:
             break
     return found
 
 
 def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str, Bounds]:
-    """Range of each coefficient in which the score is within one per cent of the best, the others constant.
+    """Return the range of each coefficient with a score within one per cent of the best, the others constant.
 
     The search goes outwards in growing steps, then by halving: narrow ranges are found as well as wide ones.
     """
@@ -254,9 +263,10 @@ def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str,
     ways = np.concatenate([np.diag(end - x) for end in form.box]).T
 
     def is_within(shares: Real) -> Any:
-        """Whether the law at a share (2 n, m) of each way from x to an end is within the limit."""
+        """Return whether the law at a share (2 n, m) of each way from x to an end is within the limit."""
         points = (x[:, None, None] + ways[:, :, None] * shares).reshape(n, -1)
-        return (judge.scores(form, points, np.full(shares.size, limit)) <= limit).reshape(shares.shape)
+        scores = judge.scores(form, points, np.full(shares.size, limit))
+        return (scores <= limit).reshape(shares.shape)
 
     # each 1.4 times the one before
     outwards = np.r_[0.0, np.geomspace(1e-9, 1.0, 60)]

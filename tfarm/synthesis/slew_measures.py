@@ -36,7 +36,9 @@ class SlewMeasures:
     def of(self, law: AnyLaw) -> dict[str, float]:
         """Return the figures by name of the measure, inf where the run stops or the tip does not settle."""
         task = self.task
-        run = Simulator(Case(self.arm, law, self.chain), task, count=self.count, between=4, outputs=(TIP,)).run()
+        run = Simulator(
+            Case(self.arm, law, self.chain), task, count=self.count, between=4, outputs=(TIP,)
+        ).run()
         names = ("settling_time_s", "overshoot", "residual_moment", "peak_input")
         if run.stopped is not None:
             return dict.fromkeys(names, np.inf)

@@ -34,8 +34,6 @@ Bounds = tuple[float, float]
 # of bounds: the place of a coefficient, and its lower (0) or upper end (1)
 Ends = list[tuple[int, int]]
 
-# lower limit of Ki, in Kp sqrt(Kp/J); the search starts at twice as much
-INTEGRAL_SPEED = 0.1
 # of the usual size: the unit of a positive coefficient
 LOGARITHMIC = 1e-8
 # of a coefficient's usual size, up and down: its first bounds
@@ -43,11 +41,19 @@ REACH = np.exp(4.0)
 
 
 class Entry(NamedTuple):
-    """Entry of a law for a signal: polynomials in s, descending, (degree + 1, laws); proper."""
+    """Entry of a law for a signal: polynomials in s, descending, (degree + 1, laws); proper, a gain without `den`."""
 
     signal: str
     num: Real
-    den: Real
+    den: Real = np.ones((1, 1))
+
+    def of_laws(self, laws: Any) -> Entry:
+        """Return the entry of some of the laws; a polynomial that is common to all laws stays."""
+
+        def of(polynomial: Real) -> Real:
+            return polynomial if polynomial.shape[1] == 1 else polynomial[:, laws]
+
+        return Entry(self.signal, of(self.num), of(self.den))
 
 
 class Coefficient(NamedTuple):
@@ -61,15 +67,15 @@ class Coefficient(NamedTuple):
 
 
 def positive_coefficient(name: str, start: float, most: float = np.inf, reach: float = REACH) -> Coefficient:
-    """A coefficient above 0, at most `most`, of the usual size `start`."""
-    return Coefficient(
-        name, LOGARITHMIC * start, (start / reach, min(start * reach, most)), (0.0, most), start
-    )
+    """Return a coefficient above 0, at most `most`, of the usual size `start`."""
+    bounds = (start / reach, min(start * reach, most))
+    return Coefficient(name, LOGARITHMIC * start, bounds, (0.0, most), start)
 
 
 def signed_coefficient(name: str, size: float) -> Coefficient:
-    """A coefficient of either sign and this usual size; 0 is its start."""
-    return Coefficient(name, size, (-REACH * size, REACH * size), (-np.inf, np.inf), 0.0)
+    """Return a coefficient of either sign and this usual size; 0 is its start."""
+    most = REACH * size
+    return Coefficient(name, size, (-most, most), (-np.inf, np.inf), 0.0)
 
 
 @frozen
@@ -99,9 +105,8 @@ class Structure:
     @property
     def signals(self) -> tuple[str, ...]:
         """The signals of the law."""
-        return tuple(
-            dict.fromkeys(each.signal for each in self.entries(self.coefficients(self.origin[:, None])))
-        )
+        start = self.coefficients(self.origin[:, None])
+        return tuple(each.signal for each in self.entries(start))
 
     @property
     def units(self) -> Real:
@@ -116,48 +121,61 @@ class Structure:
     @property
     def box(self) -> tuple[Real, Real]:
         """The least and the largest x (n,); a bound of 0 that is a physical end is replaced by a unit."""
-        low, high = np.array([each.bounds for each in self.free]).T
-        ends = np.array([each.ends for each in self.free]).T
-        return self.at(np.where((low == 0) & (ends[0] == 0), self.units, low)), self.at(high)
+        low = []
+        high = []
+        for each in self.free:
+            least, most = each.bounds
+            low.append(each.unit if least == each.ends[0] == 0.0 else least)
+            high.append(most)
+        return self.at(low), self.at(high)
 
     def at(self, coefficients: Any) -> Real:
-        """x of these coefficients (n,)."""
+        """Return x of these coefficients (n,)."""
         return np.arcsinh(np.asarray(coefficients) / self.units)
 
     def coefficients(self, x: Real) -> Real:
-        """The coefficients at x (n, laws)."""
+        """Return the coefficients at x (n, laws)."""
         return (self.units * np.sinh(x.T)).T
 
+    def by_name(self, free: Sequence[float]) -> dict[str, float]:
+        """Return all coefficients by name, the fixed ones first."""
+        return self.fixed | dict(zip(self.names, free, strict=True))
+
     def record_at(self, x: Real) -> AnyLaw:
-        """The law at x (n,), as a record."""
+        """Return the law at x (n,), as a record."""
         c = self.coefficients(x)
         if self.name == TWO_GAINS:
-            return HubFeedback(**self.fixed, **dict(zip(self.names, c.tolist(), strict=True)))
-        entries = self.entries(c[:, None])
-        blocks = {
-            each.signal: (tuple(each.num[:, 0].tolist()), tuple(each.den[:, 0].tolist())) for each in entries
-        }
+            return HubFeedback(**self.by_name(c.tolist()))
+        blocks = {}
+        for signal, num, den in self.entries(c[:, None]):
+            blocks[signal] = tuple(num[:, 0].tolist()), tuple(den[:, 0].tolist())
         return Law(blocks, name=self.name, references=tuple(blocks))
 
     def at_ends(self, x: Real) -> Ends:
-        """The ends of the bounds at which coefficients are: nearer than a thousandth of the range of x."""
+        """Return the ends of the bounds at which coefficients are: nearer than a thousandth of the range of x."""
         low, high = self.box
         is_there = abs(np.array(self.box) - x) < 1e-3 * (high - low)
         return [(place, end) for place, end in np.argwhere(is_there.T).tolist()]
 
     def ends(self, *, physical: bool) -> Ends:
-        """The ends of the bounds that are not given: the physical ones, or the others."""
-        free = [(place, each) for place, each in enumerate(self.free) if each.name not in self.given]
-        return [(n, end) for n, of in free for end in (0, 1) if (of.bounds[end] == of.ends[end]) == physical]
+        """Return the ends of the bounds that are not given: the physical ones, or the others."""
+        found = []
+        for place, each in enumerate(self.free):
+            if each.name not in self.given:
+                is_physical = np.equal(each.bounds, each.ends)
+                found += [(place, end) for end in (0, 1) if is_physical[end] == physical]
+        return found
 
     def wider(self, ends: Ends, by: float) -> Structure:
-        """The same with these bounds farther out, `by` of x, not beyond physical ends."""
+        """Return the same with these bounds farther out, `by` of x, not beyond physical ends."""
         free = list(self.free)
         for place, end in ends:
             each = free[place]
-            x = self.box[end][place] + (by if end else -by)
-            bound = float(np.clip(each.unit * np.sinh(x), *each.ends))
-            free[place] = each._replace(bounds=(each.bounds[0], bound) if end else (bound, each.bounds[1]))
+            way = by if end else -by
+            bound = float(np.clip(each.unit * np.sinh(self.box[end][place] + way), *each.ends))
+            low, high = each.bounds
+            bounds = (low, bound) if end else (bound, high)
+            free[place] = each._replace(bounds=bounds)
         return replace(self, free=tuple(free))
 
 
@@ -182,21 +200,25 @@ def structure_of(
     if name != TWO_GAINS:
         require(0.0 <= Kp < np.inf, ANGLE_GAIN, Kp, "the hub angle gain is zero (chosen) or positive")
         speed = 0.1 * min(first_frequency(arm), 1 / period)
-        Kp = Kp or float(f"{turning_inertia(arm) * speed**2:.3g}")
+        if Kp == 0.0:
+            Kp = float(f"{turning_inertia(arm) * speed**2:.3g}")
     free, entries = STRUCTURES[name].of(arm, Kp, modes, period)
     given = {}
     for key, pair in bounds.items():
-        if pair is not None:
-            require(name == TWO_GAINS, key, pair, f"goes with the structure {TWO_GAINS} alone")
-            is_range = -np.inf < pair[0] < pair[1] < np.inf
-            require(is_range, key, pair, "bounds are two finite numbers, the lower first")
-            given[key] = (float(pair[0]), float(pair[1]))
+        if pair is None:
+            continue
+        require(name == TWO_GAINS, key, pair, f"goes with the structure {TWO_GAINS} alone")
+        low, high = pair
+        is_range = -np.inf < low < high < np.inf
+        require(is_range, key, pair, "bounds are two finite numbers, the lower first")
+        given[key] = (float(low), float(high))
     free = tuple(each._replace(bounds=given.get(each.name, each.bounds)) for each in free)
     is_free = is_angle_free and not is_given and name != TWO_GAINS
     if is_free:
         # a slow integral is a slow pole, which a search for speed leaves without a limit of Ki
         free = tuple(
-            positive_coefficient("Ki", each.start, reach=REACH**2) if each.name == "Ki" else each for each in free
+            positive_coefficient("Ki", each.start, reach=REACH**2) if each.name == "Ki" else each
+            for each in free
         )
         free = (positive_coefficient(ANGLE_GAIN, Kp), *free)
         form = Structure(name, free, {}, lambda c: entries(c[0], c[1:]), tuple(given))
@@ -210,25 +232,25 @@ def structure_of(
 def check_bounds(form: Structure, arm: Arm) -> None:
     """Raise ParameterError where the bounds have gains that are too large for the arm."""
     if form.name == TWO_GAINS:
-        for bounds in zip(*(each.bounds for each in form.free), strict=True):
-            check_gains(arm, HubFeedback(**form.fixed, **dict(zip(form.names, bounds, strict=True))))
+        for corner in zip(*(each.bounds for each in form.free), strict=True):
+            check_gains(arm, HubFeedback(**form.by_name(corner)))
 
 
 def multiply_polynomials(first: Real, second: Real) -> Real:
-    """The product of polynomials (degree + 1, laws)."""
-    shape = (len(first) + len(second) - 1, max(first.shape[1], second.shape[1]))
-    total = np.zeros(shape)
+    """Return the product of polynomials (degree + 1, laws)."""
+    size = len(second)
+    laws = max(first.shape[1], second.shape[1])
+    total = np.zeros((len(first) + size - 1, laws))
     for n, row in enumerate(first):
-        total[n : n + len(second)] += row * second
+        total[n : n + size] += row * second
     return total
 
 
 def polynomial_of(*coefficients: Any) -> Real:
-    """A polynomial (degree + 1, laws) of coefficients that are numbers or (laws,)."""
+    """Return a polynomial (degree + 1, laws) of coefficients that are numbers or (laws,)."""
     return np.array(np.broadcast_arrays(*(np.atleast_1d(each) for each in coefficients)))
 
 
-ONE = np.ones((1, 1))
 # free coefficients, and their entries
 Built = tuple[Sequence[Coefficient], Callable[[Any, Real], tuple[Entry, ...]]]
 
@@ -253,34 +275,34 @@ def structure(name: str, formula: str) -> Callable[[Callable[[Arm, float, int, f
 
 
 def _rate_gain(arm: Arm, Kp: float, name: str = "K1") -> Coefficient:
-    """K1, usually that of damping ratio 1/sqrt(2) of the rigid arm under Kp, without friction."""
+    """Return K1, usually that of damping ratio 1/sqrt(2) of the rigid arm under Kp, without friction."""
     return positive_coefficient(name, float(np.sqrt(2 * Kp * turning_inertia(arm))))
 
 
 def _integral_gain(arm: Arm, Kp: float) -> Coefficient:
-    """Ki, from its lower limit on."""
-    least = INTEGRAL_SPEED * Kp * float(np.sqrt(Kp / turning_inertia(arm)))
+    """Return Ki, from its lower limit on."""
+    least = 0.1 * Kp * float(np.sqrt(Kp / turning_inertia(arm)))
     return Coefficient("Ki", LOGARITHMIC * least, (least, REACH * least), (least, np.inf), 2 * least)
 
 
 def _pole(period: float) -> Coefficient:
-    """The pole of a filter, at most the fastest of a sampled signal."""
+    """Return the pole of a filter, at most the fastest of a sampled signal."""
     return positive_coefficient("pole_rad_s", 2 / period, 2 / period)
 
 
 def _servo(Kp: Any, K1: Real) -> tuple[Entry, Entry]:
-    """Kp on the angle, K1 (laws,) on its rate."""
-    return Entry("hub_angle", polynomial_of(Kp), ONE), Entry("hub_rate", polynomial_of(K1), ONE)
+    """Return the entries of Kp on the angle and K1 (laws,) on its rate."""
+    return Entry("hub_angle", polynomial_of(Kp)), Entry("hub_rate", polynomial_of(K1))
 
 
 def _second_order(w: Real, damping: Real) -> Real:
-    """s^2 + 2 damping w s + w^2."""
+    """Return s^2 + 2 damping w s + w^2."""
     return polynomial_of(1.0, 2 * damping * w, w * w)
 
 
 @structure(TWO_GAINS, r"$v = -K_p \theta - K_1 \theta_t - K_2 M$")
 def _two_gains(arm: Arm, Kp: float, modes: int, period: float) -> Built:
-    """The gains of the paper's law, with physical ends: no damping at K1 = 0, a hub at rest at K2 = 1 (of a torque)."""
+    """Return the gains of the paper's law, to physical ends: no damping at K1 = 0, hub at rest at K2 = 1 (a torque)."""
     unit = arm.input_per_torque
     rate = rate_unit(arm)
     most = 2.0 * turning_inertia(arm) * frequency_above_mode(arm, 1)
@@ -288,8 +310,11 @@ def _two_gains(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     K2 = Coefficient(PLANE[1], unit, (-3.0 * unit, unit), (-np.inf, unit), 0.0)
 
     def entries(Kp: Any, c: Real) -> tuple[Entry, ...]:
-        moment = Entry("root_moment", polynomial_of(c[1]), ONE)
-        return (*_servo(Kp, c[0])[0 if np.any(Kp) else 1 :], moment)
+        angle, rate = _servo(Kp, c[0])
+        moment = Entry("root_moment", polynomial_of(c[1]))
+        if not np.any(Kp):
+            return rate, moment
+        return angle, rate, moment
 
     return (K1, K2), entries
 
@@ -304,9 +329,8 @@ def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     def entries(Kp: Any, c: Real) -> tuple[Entry, ...]:
         K1, pole, w, a, b = c
         num = multiply_polynomials(polynomial_of(K1 + Kp / pole, Kp), _second_order(w, a))
-        return (
-            Entry("hub_angle", num, multiply_polynomials(polynomial_of(1 / pole, 1.0), _second_order(w, b))),
-        )
+        den = multiply_polynomials(polynomial_of(1 / pole, 1.0), _second_order(w, b))
+        return (Entry("hub_angle", num, den),)
 
     free = (
         _rate_gain(arm, Kp),
@@ -324,13 +348,16 @@ def _lead(arm: Arm, Kp: float, modes: int, period: float) -> Built:
         zero, pole = c
         return (Entry("hub_angle", polynomial_of(Kp / zero, Kp), polynomial_of(1 / pole, 1.0)),)
 
-    return (positive_coefficient("zero_rad_s", Kp / _rate_gain(arm, Kp).start), _pole(period)), entries
+    zero = positive_coefficient("zero_rad_s", Kp / _rate_gain(arm, Kp).start)
+    return (zero, _pole(period)), entries
 
 
 @structure("PI", r"$v = -(K_p + K_i/s) \, \theta$, for a hub with friction or back-EMF")
 def _pi(arm: Arm, Kp: float, modes: int, period: float) -> Built:
-    den = polynomial_of(1.0, 0.0)
-    return (_integral_gain(arm, Kp),), lambda Kp, c: (Entry("hub_angle", polynomial_of(Kp, c[0]), den),)
+    def entries(Kp: Any, c: Real) -> tuple[Entry, ...]:
+        return (Entry("hub_angle", polynomial_of(Kp, c[0]), polynomial_of(1.0, 0.0)),)
+
+    return (_integral_gain(arm, Kp),), entries
 
 
 @structure("PID", r"$v = -(K_p + K_i/s + K_d s/(1 + s/p)) \, \theta$")
@@ -350,7 +377,7 @@ def _pid(arm: Arm, Kp: float, modes: int, period: float) -> Built:
 def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     def entries(Kp: Any, c: Real) -> tuple[Entry, ...]:
         num = np.zeros((1, c.shape[1]))
-        den = ONE
+        den = np.ones((1, 1))
         for g, w, zeta in c[1:].reshape(modes, 3, -1):
             own = _second_order(w, zeta)
             num = multiply_polynomials(num, own)
@@ -361,7 +388,8 @@ def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     # of frequency and damping of a filter
     reach = np.exp(2.0)
     free = [_rate_gain(arm, Kp)]
-    for n, w in enumerate(natural_modes(arm, modes).natural_frequency[-modes:].tolist(), 1):
+    flexible = natural_modes(arm, modes).natural_frequency[-modes:]
+    for n, w in enumerate(flexible.tolist(), 1):
         free += [
             signed_coefficient(f"gain_{n}", 0.1 * arm.input_per_torque),
             positive_coefficient(f"filter_rad_s_{n}", min(w, 1 / period), 2 / period, reach),
@@ -374,7 +402,8 @@ def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Built:
 def _strain_rate(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     def entries(Kp: Any, c: Real) -> tuple[Entry, ...]:
         K1, g, pole = c
-        return (*_servo(Kp, K1), Entry("root_moment", polynomial_of(g, 0.0), polynomial_of(1 / pole, 1.0)))
+        filtered = Entry("root_moment", polynomial_of(g, 0.0), polynomial_of(1 / pole, 1.0))
+        return (*_servo(Kp, K1), filtered)
 
     gain = signed_coefficient("gain_s", 0.1 * arm.input_per_torque / first_frequency(arm))
     return (_rate_gain(arm, Kp), gain, _pole(period)), entries

@@ -30,8 +30,6 @@ Tell = Callable[[str], None]
 
 # arms at random inside the box
 ARMS_TRIED = 24
-# of a score: an arm inside is added if it is worse by more
-MUCH_WORSE = 0.01
 
 
 class NamedArm(NamedTuple):
@@ -43,11 +41,11 @@ class NamedArm(NamedTuple):
 
 
 def vary_arm(arm: Arm, key: str, value: float) -> Arm:
-    """The arm with another value of one number, named as in its file ("payload.mass", "hub.friction") or in a locus.
+    """Return the arm with another value of one number, named as in its file ("payload.mass") or in a locus.
 
     Raises ParameterError for an unknown key, and for a value as its parts do.
     """
-    name = {f"{room}.{field}": name for name, (room, field) in ADJUSTABLE.items()}.get(key, key)
+    name = {".".join(place): name for name, place in ADJUSTABLE.items()}.get(key, key)
     if name in ADJUSTABLE:
         return arm.having(**{name: value})
     return KeyedArms(arm, (key,), "range").at({key: value})
@@ -82,19 +80,21 @@ class ArmBox:
     @property
     def corners(self) -> list[NamedArm]:
         """The arms at both ends of every range."""
-        return [
-            self.at(np.array(shares)) for shares in itertools.product((0.0, 1.0), repeat=len(self.ranges))
-        ]
+        corners = itertools.product((0.0, 1.0), repeat=len(self.ranges))
+        return [self.at(np.array(shares)) for shares in corners]
 
     def at(self, shares: Real) -> NamedArm:
-        """The arm at these shares (n,) of the ranges, 0 to 1; of logarithms where the ends are far apart."""
+        """Return the arm at these shares (n,) of the ranges, 0 to 1; of logarithms where the ends are far apart."""
         arm = self.arm
         numbers = {}
         for (key, (low, high)), share in zip(self.ranges.items(), shares.tolist(), strict=True):
+            value = low + share * (high - low)
             # a range of numbers of one sign whose ends are further apart is one of logarithms
-            far = low > 0 and high > 10.0 * low
-            inside = low * (high / low) ** share if far else low + share * (high - low)
-            numbers[key] = low if share == 0 else high if share == 1 else float(inside)
+            if low > 0 and high > 10.0 * low:
+                value = low * (high / low) ** share
+            if share in (0.0, 1.0):
+                value = high if share else low
+            numbers[key] = float(value)
             arm = vary_arm(arm, key, numbers[key])
         values = ", ".join(f"{key} = {value:.6g}" for key, value in numbers.items())
         return NamedArm(f"{self.arm.name}, {values}", arm, numbers)
@@ -116,23 +116,31 @@ def worst_inside(box: ArmBox, badness: Callable[[Arm], float]) -> tuple[NamedArm
         n = int(np.argmax(scores))
         return scores[n], places[n]
 
-    worst, place = worst_of(list(np.random.default_rng(0).random((ARMS_TRIED, size))))
+    worst, place = worst_of([*np.random.default_rng(0).random((ARMS_TRIED, size))])
+    ways = np.concatenate([np.eye(size), -np.eye(size)])
     # from the worst of them on, along each of the numbers
     for step in (0.25, 0.125, 0.0625):
         if math.isinf(worst):
             break
-        around = [np.clip(place + step * way, 0.0, 1.0) for way in (*np.eye(size), *-np.eye(size))]
-        worst, place = max((worst, place), worst_of(around), key=lambda pair: pair[0])
+        worse, other = worst_of([*np.clip(place + step * ways, 0.0, 1.0)])
+        if worse > worst:
+            worst = worse
+            place = other
     return box.at(place), worst, tried
 
 
 def arms_of(arm: Arm, also: Sequence[Arm], box: ArmBox | None) -> list[NamedArm]:
-    """The arm, those of the list, and the corners of the box.  Raises ParameterError for too many in the list."""
+    """Return the arm, those of the list, and the corners of the box.
+
+    Raises ParameterError for too many in the list.
+    """
     # of a list, for the same reason
     most_arms = 8
     require(len(also) <= most_arms, "also", len(also), f"at most {most_arms} further arms")
-    corners = [] if box is None else [each for each in box.corners if each.arm != arm]
-    return [*(NamedArm(each.name, each, {}) for each in (arm, *also)), *corners]
+    named = [NamedArm(each.name, each, {}) for each in (arm, *also)]
+    if box is None:
+        return named
+    return named + [each for each in box.corners if each.arm != arm]
 
 
 class WorstCase(NamedTuple):
@@ -146,11 +154,15 @@ class WorstCase(NamedTuple):
     worse: str | None = None
 
     def sentence(self, number: int) -> str:
-        """The choice in a sentence, with its limits."""
+        """Return the choice in a sentence, with its limits."""
+        if number == 1:
+            return ""
         if not self.ranges:
-            return f"the worst of {number} arms" if number > 1 else ""
+            return f"the worst of {number} arms"
         box = ", ".join(f"{key} {low:g} to {high:g}" for key, (low, high) in self.ranges.items())
-        ended = "none that is worse" if self.worse is None else f"still a worse one, {self.worse}"
+        ended = "none that is worse"
+        if self.worse is not None:
+            ended = f"still a worse one, {self.worse}"
         return (
             f"the worst of {number} arms, the corners of the box {box} among them; a search of {self.tried} arms "
             f"inside it found {ended}: no proof over the box"
@@ -171,6 +183,8 @@ def for_the_worst(
     `score_on` is the score of one arm, inf where the law is unstable.  Raises ConvergenceError where no law is found
     that is stable on all arms, or where it stays unstable on one inside the box.
     """
+    # of a score: an arm inside is added if it is worse by more
+    much_worse = 0.01
     named = list(arms)
     if box is None:
         return find(named, None, "whole"), named, WorstCase({}, 0)
@@ -183,7 +197,7 @@ def for_the_worst(
         limit = max(score_on(found, each.arm) for each in named)
         worst, score, number = worst_inside(box, partial(score_on, found))
         tried += number
-        is_worse = score > limit + MUCH_WORSE * abs(limit)
+        is_worse = score > limit + much_worse * abs(limit)
         if effort != "sketch" and not is_worse:
             return found, named, WorstCase(box.ranges, tried)
         if not efforts and math.isinf(score):
@@ -199,9 +213,10 @@ def for_the_worst(
 
 def same_input(arms: Sequence[NamedArm]) -> None:
     """Raise ParameterError for arms with different inputs."""
-    first = arms[0].arm.input
-    for each in arms:
+    first, *others = arms
+    for each in others:
         remedy = (
-            f"the input of {each.name} is {each.arm.input}, that of {arms[0].name} {first}: one law has one"
+            f"the input of {each.name} is {each.arm.input}, that of {first.name} {first.arm.input}: "
+            "one law has one"
         )
-        require(each.arm.input == first, "also", each.name, remedy)
+        require(each.arm.input == first.arm.input, "also", each.name, remedy)
