@@ -201,23 +201,28 @@ class Sweep:
         return value * exact(one.unit)
 
     def _end(self, condition: Any) -> tuple[Any, Any]:
+        """Return the factors of motion and force in a condition at the tip."""
         rest, inertia, force = condition
         return self.S * inertia + rest, force
 
     def _plane_at_mark(self, p: SolutionPlane) -> SolutionPlane:
+        """Return the plane in the scale that states at a mark have."""
         return p
 
     def _plane_inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
+        """Return the plane at the inner end of an element from that at its outer one."""
         if isinstance(element, Segment):
             return _across_rows(*self._transition(element), p)
         return _inside_element(KINDS[type(element)], element, self.s, self.S, p)
 
     def _row_beyond(self, element: Any, f: SolutionRow) -> SolutionRow:
+        """Return the condition at the outer end of an element from that at its inner one."""
         if isinstance(element, Segment):
             return _row_across(*self._transition(element), f)
         return _beyond_element(KINDS[type(element)], element, self.s, self.S, f)
 
     def _transition(self, segment: Any) -> tuple[SolutionRow, ...]:
+        """Return the transition matrix of a segment, computed once."""
         if id(segment) not in self._rows:
             l = segment.length
             (over_d, z_sum, z_product) = self._sums(segment)

@@ -60,11 +60,15 @@ def inlined(function: _Kernel) -> _Kernel:
 
 
 def _refuse(*_: Any) -> None:
+    """Raise TypeError, in the place of a call from Python."""
     raise TypeError("an inlined kernel is called by kernels alone; python_of(it) is for Python")
 
 
 def _kernel_of(function: _Kernel, is_inlined: bool) -> Any:
-    """Return a kernel that others call with the type of a constant: numba would compile it anew for each value."""
+    """Return the kernel of a function; others call it with the type of a constant.
+
+    Numba itself would compile it anew for each value.
+    """
     jit = njit(
         error_model="numpy",
         nogil=True,

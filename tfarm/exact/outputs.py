@@ -98,9 +98,13 @@ class Output:
         return {"root": 0.0, "tip": 1.0, "x": x}[self.place]
 
 
-OUTPUTS: Mapping[str, Output] = MappingProxyType(
-    {each.name: each for each in (Output(**row) for row in _TABLES["output"])}
-)
+def _named_outputs() -> dict[str, Output]:
+    """Return the outputs of the table by their names."""
+    rows = [Output(**row) for row in _TABLES["output"]]
+    return {each.name: each for each in rows}
+
+
+OUTPUTS: Mapping[str, Output] = MappingProxyType(_named_outputs())
 
 
 def output(wanted: str | Output) -> Output:

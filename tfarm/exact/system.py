@@ -332,6 +332,7 @@ class System:
 
     @cached_property
     def _undamped(self) -> System | None:
+        """The chain without damping, None where nothing dissipates."""
         if self.is_undamped:
             return None
         return self.with_damping(0.0)

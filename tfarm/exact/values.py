@@ -122,14 +122,14 @@ def free_fields(
     The states satisfy axis . (W, Psi, M, Q) = 0 on the hub's axis, by default W = 0.
     """
 
-    def with_states() -> Layout:
+    def make_layout() -> Layout:
         each: list[OutputFormula] = []
         for place in places:
             each += [OutputFormula(place, field, ZERO, 0, ONE) for field in Field]
         each.append(OutputFormula(None, -1, ONE, 0, ONE))
         return Layout(chain, tuple(dict.fromkeys(places)), tuple(each))
 
-    layout = chain.keep(tuple(places), with_states)
+    layout = chain.keep(tuple(places), make_layout)
     found, _ = _sweep_layout(layout, s, np.asarray(read_only(np.ascontiguousarray(axis))))
     return found[2:-1].reshape(len(places), 4, s.size).transpose(1, 2, 0), found[-1], found[1]
 

@@ -338,6 +338,7 @@ class _Bench:
         return self._first_within(error, map(model, counts), "modal")
 
     def _measure(self, model: PartialFractions, method: Reduction, note: str = "") -> ReducedModel:
+        """Return a model with its error."""
         errors, worst_at = self.ruler.measure(model)
         return ReducedModel(model, method, self.band, errors, worst_at, *first_mode_lacking(model), note)
 
