@@ -38,7 +38,7 @@ from tfarm.exported.word_length import close_state_space
 from tfarm.files import is_standard_output, mat_content, write_file
 from tfarm.records import frozen
 from tfarm.reduced import BAND, ReducedModel, modal_model, reduce
-from tfarm.reduced.partial_fractions import CLEAR_OF_POLES, distance, frequencies_around
+from tfarm.reduced.partial_fractions import frequencies_around, is_clear_of
 from tfarm.reduced.reduction import NORM
 from tfarm.response import transfer
 from tfarm.response.signals import Signals
@@ -172,7 +172,7 @@ def response_data(
 ) -> dict[str, Any]:
     """Return the exact frequency response (outputs, 1, n) over a range [rad/s], clear of the poles on the axis."""
     omega = np.geomspace(*band, 1000)
-    omega = omega[distance(omega, frequencies_around(arm, band[1])) > CLEAR_OF_POLES * omega]
+    omega = omega[is_clear_of(omega, frequencies_around(arm, band[1]))]
     return {
         "omega": omega,
         "response": G(1j * omega)[:, None, :],

@@ -95,10 +95,10 @@ class AxisSweep(Sweep):
         """D(i omega)."""
         return self.input + self.S * self.A[2] * self.theta
 
-    def _inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
+    def _plane_inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
         if isinstance(element, Segment):
             return self._joined(element, p)
-        p = super()._inside(element, p)
+        p = super()._plane_inside(element, p)
         if isinstance(element, Spring):
             self._step(p[0], 1)
         return p
