@@ -39,8 +39,6 @@ from tfarm.schema import Column, Quantity, Table
 
 # of every interval of a fit: the usual one
 CONFIDENCE = 0.95
-# of |H|: no measured response is better known than that, whatever its coherence
-LEAST_SHARE = 1e-5
 
 
 def require_all(key: str, values: Real, is_good: NDArray[np.bool_], remedy: str) -> None:
@@ -192,6 +190,11 @@ class Noise:
         ),
     ]
 
+    @property
+    def is_finite(self) -> NDArray[np.bool_]:
+        """Whether anything was measured, at each frequency (n,)."""
+        return np.isfinite(self.sigma)
+
 
 def noise_of(data: Measured) -> Noise:
     """The noise of a measured response.
@@ -200,14 +203,17 @@ def noise_of(data: Measured) -> Noise:
     (Bendat and Piersol 2010, (9.90)); without n it is known up to a factor.  With nothing given it is the scatter of
     the values about a parabola through their neighbours.
     """
+    # of |H|: no measured response is better known than that, whatever its coherence
+    least_share = 1e-5
     if data.sigma is not None:
         return Noise(sigma=data.sigma, is_known=True, source="sigma of the file")
     if data.coherence is None:
-        return Noise(sigma=_scatter(data.values), is_known=False, source="scatter of the values")
+        sigma = scatter_of(data.values, least_share)
+        return Noise(sigma=sigma, is_known=False, source="scatter of the values")
     g = data.coherence
     size = abs(data.values)
     with np.errstate(divide="ignore"):
-        share = np.maximum(np.sqrt((1.0 - g) / (2.0 * (data.averages or 1) * g)), LEAST_SHARE)
+        share = np.maximum(np.sqrt((1.0 - g) / (2.0 * (data.averages or 1) * g)), least_share)
     # a share of nothing is no deviation
     sigma = np.where((g == 0) | (size == 0), np.inf, size * share)
     if data.averages is None:
@@ -215,14 +221,14 @@ def noise_of(data: Measured) -> Noise:
     return Noise(sigma=sigma, is_known=True, source=f"coherence of {data.averages} averages")
 
 
-def _scatter(values: NDArray[Any]) -> Real:
-    """The deviation of each value from a parabola through its four neighbours, smoothed.
+def scatter_of(values: NDArray[Any], least_share: float) -> Real:
+    """Return the deviation of each value from a parabola through its four neighbours, smoothed.
 
-    It is LEAST_SHARE of the value at least.
+    It is the least share of the value at least.
     """
     size = abs(values)
     if size.size < 5:
-        return np.maximum(size, LEAST_SHARE * size.max())
+        return np.maximum(size, least_share * size.max())
     # x_k less the parabola through x_(k-2), x_(k-1), x_(k+1), x_(k+2): weights -1/6, 2/3, 2/3, -1/6 of these
     weights = np.array([1, -4, 6, -4, 1]) / 6
     inside = size[2:-2]
@@ -231,13 +237,11 @@ def _scatter(values: NDArray[Any]) -> Real:
     typical = np.median(away / inside[inside > 0]) / 1.17741 if away.size else 1.0
     # which a value of 0 is taken for
     least = max(1e-3 * np.median(size), 1e-6 * size.max())
-    return np.maximum(size, least) * max(typical, LEAST_SHARE)
+    return np.maximum(size, least) * max(typical, least_share)
 
 
 # of a record; an hour of two signals at 1 kHz as text has 150 MB
 MOST_RECORD_BYTES = 256 * 1024 * 1024
-# its unit, and rad/s in one
-FREQUENCIES = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}
 VALUES = ("re", "im", "abs", "db", "deg")
 # as it is written in a cell or an option
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -387,13 +391,15 @@ def check_signal(name: str, key: str) -> None:
 # ------------------------------------------------------------ CSV
 def _frequencies(sheet: Sheet) -> Real:
     """The frequencies [rad/s], once the header is known to be one and they ascend."""
-    known = (*FREQUENCIES, *VALUES, "coherence", "sigma", "averages")
+    # its unit, and rad/s in one
+    frequencies = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}
+    known = (*frequencies, *VALUES, "coherence", "sigma", "averages")
     for name in sheet.columns:
         require(name in known, "header", name, did_you_mean(name.lower(), known))
-    found = [name for name in FREQUENCIES if name in sheet.columns]
+    found = [name for name in frequencies if name in sheet.columns]
     require(len(found) == 1, "header", [*sheet.columns], "one column of frequencies: hz or rad_s")
     (name,) = found
-    unit, scale = FREQUENCIES[name]
+    unit, scale = frequencies[name]
     own = sheet.units[name]
     require(own.lower() in ("", unit.lower()), f"unit of {name}", own, f"{name} is in {unit}")
     frequency = sheet.columns[name]

@@ -38,8 +38,11 @@ if TYPE_CHECKING:
 
 # probability below which residuals are called correlated
 NOT_WHITE = 1e-3
-# parameters of a mode: sigma, w, a, b; the constant c is the last
-EACH = 4
+
+
+def count_parameters(modes: int) -> int:
+    """Return the number of parameters of that many modes: the sigma, w, a and b of each, and the constant c."""
+    return 4 * modes + 1
 
 
 class DecayMode(NamedTuple):
@@ -198,7 +201,7 @@ def _samples(
     # within half a millionth of a sample: rounding of times
     kept = abs(2 * times - low - high) <= high - low + 1e-6 * recording.period
     require(1 <= modes <= 20, "--modes", modes, "a whole number from 1 to 20")
-    least = 4 * (EACH * modes + 1)
+    least = 4 * count_parameters(modes)
     taken = f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least}"
     remedy = f"{taken} (the record goes from {times[0]:g} to {times[-1]:g} s)"
     require(kept.sum() >= least, "--from", low, remedy, recording.source)
@@ -213,10 +216,10 @@ def by_part(t: Real, y: Real, poles: Complex) -> tuple[Real, Real]:
     """
     w = np.asarray(poles.imag, float)
     variance = np.full(w.size, np.inf)
-    found = nearest_sum(t - t[0], y, poles) if y.size > 2 * (EACH * w.size + 1) else None
+    found = nearest_sum(t - t[0], y, poles) if y.size > 2 * count_parameters(w.size) else None
     if found is not None:
         spread = found.covariance(is_white=whiteness(found.e) >= NOT_WHITE)
-        _, of_w, of_a, of_b = np.diag(spread)[:-1].reshape(EACH, w.size)
+        _, of_w, of_a, of_b = np.diag(spread)[:-1].reshape(4, w.size)
         # deviations of the amplitude of an oscillation that is determined: noise has 4
         variance = np.where(found.amplitude**2 > 8.0**2 * (of_a + of_b) / 2, of_w, np.inf)
         w = np.asarray(found.poles.imag, float)
@@ -262,7 +265,7 @@ class DampedSum:
     @property
     def freedom(self) -> int:
         """Samples less parameters."""
-        return self.e.size - EACH * self.poles.size - 1
+        return self.e.size - count_parameters(self.poles.size)
 
     def covariance(self, *, is_white: bool) -> Real:
         """Of the parameters (4 n + 1, 4 n + 1); the Jacobian's columns are scaled for the inverse's sake."""

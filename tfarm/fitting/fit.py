@@ -27,17 +27,16 @@ from tfarm.digits import join_words
 from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.files import is_standard_output, write_file
 from tfarm.fitting.data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of, rms
+from tfarm.fitting.intervals import BetterError, Fitted, confidence_intervals
 from tfarm.fitting.misses import Miss, Remedy, misses_of, remedies_of
 from tfarm.fitting.model import SENSOR_DELAY, SENSOR_GAIN, FitResponse, Problem, RingMode, free_parameters
-from tfarm.fitting.overlay import ResonanceShift, ratio_of, resonance_shifts
+from tfarm.fitting.overlay import ResonanceShift, resonance_shifts
 from tfarm.fitting.posterior import SUFFIX, Posterior, Repeats, posterior_of, repeats
+from tfarm.fitting.ratio import ratio_of
 from tfarm.fitting.solve import (
     FIT_SEED,
-    BetterError,
-    Fitted,
     Solution,
     best_solution,
-    confidence_intervals,
     is_explained,
     nearest_minimum,
     sum_of_squares,

@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 
@@ -36,11 +36,6 @@ from tfarm.spectrum import modes
 from tfarm.spectrum.box import newton
 from tfarm.spectrum.table import first_frequency
 
-# times or a part of it: beyond, a search has lost its way, or the data say nothing
-FARTHEST_FROM_START = 1e4
-# of a derivative by differences: the rounding of a float over it is 1e-10, its square below
-COORDINATE_STEP = 2.0**-20
-
 
 @frozen
 class Parameter:
@@ -55,6 +50,8 @@ class Parameter:
     high: float
     size: float = 0.0
     prior: tuple[float, float] | None = None
+    # times the start, or a part of it: beyond, a search has lost its way, or the data say nothing
+    farthest: ClassVar[float] = 1e4
 
     def value(self, coordinate: float) -> float:
         """The number at a coordinate of the search, 0 at the start."""
@@ -77,15 +74,14 @@ class Parameter:
         """Of the coordinate."""
         if self.size:
             return self.coordinate(self.low), self.coordinate(self.high)
-        shares = np.clip(
-            [self.low / self.start, self.high / self.start], 1 / FARTHEST_FROM_START, FARTHEST_FROM_START
-        )
+        ends = (self.low / self.start, self.high / self.start)
+        shares = np.clip(ends, 1 / self.farthest, self.farthest)
         return math.log(shares.min()), math.log(shares.max())
 
     def ends(self, coordinates: Sequence[float]) -> list[float | None]:
         """The numbers at the ends of an interval, the lower first; None where only the reach of the search ended it."""
         # a search that comes nearer to its reach has ended there
-        farthest = math.inf if self.size else math.log(FARTHEST_FROM_START) - 1e-6
+        farthest = math.inf if self.size else math.log(self.farthest) - 1e-6
         found = [self.value(each) if abs(each) < farthest else None for each in coordinates]
         return found if self.start > 0 or self.size else found[::-1]
 
@@ -220,11 +216,11 @@ class FitResponse:
     @property
     def size(self) -> int:
         """How many real residuals it has: two a frequency at which something was measured."""
-        return 2 * np.isfinite(self.noise.sigma).sum()
+        return 2 * self.noise.is_finite.sum()
 
     def over_deviation(self, values: Complex) -> Real:
         """Values at its frequencies over their deviations: real parts, then imaginary ones, of what was measured."""
-        kept = np.isfinite(self.noise.sigma)
+        kept = self.noise.is_finite
         return in_parts(values[kept] / self.noise.sigma[kept])
 
     def at(self, omega: Real, values: Complex, sigma: Real) -> FitResponse:
@@ -348,18 +344,19 @@ class Problem:
     def jacobian(self, point: Real) -> Real:
         """(size, parameters): the derivatives of the residuals."""
         here = self._terms(point)
-        return np.stack(
-            [self._slope(here, point, step) for step in COORDINATE_STEP * np.eye(point.size)], axis=1
-        )
+        # the rounding of a float over it is 1e-10, its square below
+        size = 2.0**-20
+        return np.stack([self._slope(here, point, step) for step in size * np.eye(point.size)], axis=1)
 
     def _slope(self, here: tuple[list[Fraction], Real], point: Real, step: Real) -> Real:
         """The derivatives along one coordinate; from the arm itself where there is none on one side."""
         sides = [here, here]
+        size = float(step.max())
         width = 0.0
         for side, to in enumerate((point - step, point + step)):
             with suppress(ParameterError):
                 sides[side] = self._terms(to)
-                width += COORDINATE_STEP
+                width += size
         (below, low), (above, high) = sides
         slopes = []
         for (N, D, scale), down, up, one in zip(here[0], below, above, self.responses, strict=True):
@@ -368,7 +365,7 @@ class Problem:
             dN = up.N * upper - down.N * lower
             dD = up.D * upper - down.D * lower
             slopes.append(one.over_deviation((dN - N / D * dD) / D))
-        return np.concatenate([*slopes, high - low]) / max(width, COORDINATE_STEP)
+        return np.concatenate([*slopes, high - low]) / max(width, size)
 
     def _terms(self, point: Real) -> tuple[list[Fraction], Real]:
         """The responses, and what decays and priors leave."""

@@ -25,7 +25,8 @@ from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.digits import join_words
 from tfarm.errors import require
 from tfarm.fitting.data import CONFIDENCE
-from tfarm.fitting.solve import FIT_SEED, OPEN_DEVIATION, Fitted, Solution, nearest_minimum, principal_axes
+from tfarm.fitting.intervals import Fitted
+from tfarm.fitting.solve import FIT_SEED, OPEN_DEVIATION, Solution, nearest_minimum, principal_axes
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 

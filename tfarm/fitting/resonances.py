@@ -26,9 +26,13 @@ from tfarm.moved import moved
 from tfarm.records import frozen
 from tfarm.response.frequency import HERTZ
 
-_DECAYS = "tfarm.fitting.decays"
 __getattr__ = moved(
-    __name__, {"DecayMode": _DECAYS, "Ring": f"{_DECAYS}:RingdownFit", "ring": f"{_DECAYS}:fit_ringdown"}
+    __name__,
+    {
+        "DecayMode": "tfarm.fitting.decays",
+        "Ring": "tfarm.fitting.decays:RingdownFit",
+        "ring": "tfarm.fitting.decays:fit_ringdown",
+    },
 )
 
 # of ln w: what a peak or a pole in the band costs without a partner; so partners are 1.8 apart at most
@@ -141,7 +145,7 @@ def least_projected(columns: Callable[[Real], Real], y: Real, start: Real, **how
 
 def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
     """The pole and residue of the peak at a place; None where its lines do not determine them."""
-    kept = _around(data, place)
+    kept = lines_of_peak(data, place)
     omega = data.omega[kept]
     sigma = sigma[kept]
     # the number of coefficients c
@@ -159,7 +163,7 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
         return in_parts(np.r_["0,2", up + down, 1j * (up - down), powers] / sigma).T
 
     y = in_parts(data.values[kept] / sigma)
-    half = max(_half_width(data, place), np.ptp(omega) / (4 * omega.size))
+    half = max(half_width(data, place), np.ptp(omega) / (4 * omega.size))
     found = least_projected(columns, y, np.array([half, w]))
     sigma_p, w_p = found.x.tolist()
     if not found.success or not omega[0] < w_p < omega[-1] or abs(sigma_p) > w_p:
@@ -169,28 +173,27 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
     return Resonance(pole=complex(-sigma_p, w_p), residue=complex(re, im), std=np.sqrt(np.diag(spread)))
 
 
-def _half_width(data: Measured, place: int) -> float:
-    """Half the width [rad/s] of a peak where it has lost 3 dB, to the nearer side."""
+def half_width(data: Measured, place: int) -> float:
+    """Return half the width [rad/s] of a peak where it has lost 3 dB, to the nearer side."""
     size = abs(data.values)
     away = abs(data.omega - data.omega[place])
     return float(away[size < size[place] / math.sqrt(2)].min(initial=np.ptp(data.omega)))
 
 
-def _around(data: Measured, place: int) -> slice:
-    """The lines from dip to dip around a peak, and no farther than some of its widths, but three to each side."""
+def lines_of_peak(data: Measured, place: int) -> slice:
+    """Return the lines from dip to dip around a peak, no farther than some of its widths, but three to each side."""
     size = abs(data.values)
     away = abs(data.omega - data.omega[place])
     # half-widths of a peak that its pole is fitted to: tuned with `resonance_at`'s background, for the least bias
-    reach = 3.0 * _half_width(data, place)
+    reach = 3.0 * half_width(data, place)
 
     def end(way: int) -> int:
         at = place
         lowest = size[place]
-        while (
-            0 <= at + way < size.size
-            and size[at + way] < 2 * lowest
-            and (away[at] < reach or abs(at - place) < 3)
-        ):
+        while 0 <= at + way < size.size and (away[at] < reach or abs(at - place) < 3):
+            # the flank of the next peak
+            if size[at + way] >= 2 * lowest:
+                break
             at += way
             lowest = min(lowest, size[at])
         return at
