@@ -42,7 +42,7 @@ def found():
 def test_each_resonance_is_the_true_arms_pole_and_residue(pair, found):
     """Within five of the deviations that the fit to its lines gives; the poles are followed from the undamped modes."""
     one, ratio = found[pair], Ratio(TRUE, *pair)
-    eigenvalues = tfarm.damped_modes(tfarm.modes(ratio.driven, 4)).eigenvalues
+    eigenvalues = tfarm.damped_modes(tfarm.modes(ratio.driven_arm, 4)).eigenvalues
     poles = np.sort_complex(eigenvalues[eigenvalues.imag > 0])[::-1]
     assert [row.mode for row in one.modes] == [1, 2, 3]
     for row, pole in zip(one.modes, poles, strict=False):

@@ -153,12 +153,12 @@ class Measured:
 
 
 def in_parts(values: Complex) -> Real:
-    """Real parts, then imaginary ones, along the last axis: (..., n) becomes (..., 2 n)."""
+    """Return real parts, then imaginary ones, along the last axis: (..., n) becomes (..., 2 n)."""
     return np.concatenate([values.real, values.imag], axis=-1)
 
 
 def rms(values: NDArray[Any]) -> float:
-    """The root mean square."""
+    """Return the root mean square."""
     return float(np.sqrt((abs(values) ** 2).mean()))
 
 
@@ -197,7 +197,7 @@ class Noise:
 
 
 def noise_of(data: Measured) -> Noise:
-    """The noise of a measured response.
+    """Return the noise of a measured response.
 
     With coherence g^2 of an estimate from n averages the relative deviation of a part is sqrt((1 - g^2)/(2 n g^2))
     (Bendat and Piersol 2010, (9.90)); without n it is known up to a factor.  With nothing given it is the scatter of
@@ -263,7 +263,7 @@ class Sheet:
 
 
 def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
-    """The columns of a text file.
+    """Return the columns of a text file.
 
     Raises ParameterError naming the line for a missing or doubled name, a row of another length, or what is no finite
     number; naming `key` where the file cannot be read.
@@ -286,7 +286,7 @@ def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
 
 
 def _header(cells: Sequence[str]) -> dict[str, str]:
-    """The unit of each column by its name; a first line of numbers is a missing header."""
+    """Return the unit of each column by its name; a first line of numbers is a missing header."""
     units: dict[str, str] = {}
     for place, cell in enumerate(cells, start=1):
         name, unit = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell, re.DOTALL).groups("")  # type: ignore[union-attr]
@@ -308,7 +308,7 @@ def _cell(text: str) -> str:
 
 
 def _numbers(names: Sequence[str], rows: Sequence[tuple[int, str]], separator: str) -> Real:
-    """The cells (rows, columns) of numbered lines, by NumPy; the line of a row that is none is named."""
+    """Return the cells (rows, columns) of numbered lines, by NumPy; the line of a row that is none is named."""
     for line, text in rows:
         if (count := text.count(separator) + 1) != len(names):
             raise ParameterError(
@@ -324,14 +324,14 @@ def _numbers(names: Sequence[str], rows: Sequence[tuple[int, str]], separator: s
 
 
 def _number(text: str) -> float:
-    """The finite number that a cell holds, with a decimal point or comma; nan for anything else."""
+    """Return the finite number that a cell holds, with a decimal point or comma; nan for anything else."""
     plain = _cell(text).replace(",", ".")
     value = float(plain) if re.fullmatch(NUMBER, plain, re.ASCII) else math.nan
     return value if math.isfinite(value) else math.nan
 
 
 def data_of(text: str, key: str = "--data") -> Measured:
-    """The measured response that the command line means by "tip_acceleration/hub_angle=sweep.csv".
+    """Return the measured response that the command line means by "tip_acceleration/hub_angle=sweep.csv".
 
     Raises ParameterError for another form, a signal that is none, and for what `read_measured` refuses.
     """
@@ -347,7 +347,7 @@ def data_of(text: str, key: str = "--data") -> Measured:
 
 
 def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Measured:
-    """The response `output`/`input` of a CSV file, or of a UFF file with a data set 58 (its number after a #).
+    """Return the response `output`/`input` of a CSV file, or of a UFF file with a data set 58 (its number after a #).
 
     Raises ParameterError, naming file and line, for a header without frequency or value, for frequencies that are
     repeated or not sorted, a coherence that is 0 everywhere, and for what else no measurement can be.
@@ -390,7 +390,7 @@ def check_signal(name: str, key: str) -> None:
 
 # ------------------------------------------------------------ CSV
 def _frequencies(sheet: Sheet) -> Real:
-    """The frequencies [rad/s], once the header is known to be one and they ascend."""
+    """Return the frequencies [rad/s], once the header is known to be one and they ascend."""
     # its unit, and rad/s in one
     frequencies = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}
     known = (*frequencies, *VALUES, "coherence", "sigma", "averages")
@@ -413,7 +413,7 @@ def _frequencies(sheet: Sheet) -> Real:
 
 
 def _values(sheet: Sheet) -> Complex:
-    """The complex response, of whichever two columns there are."""
+    """Return the complex response, of whichever two columns there are."""
     pair = tuple(name for name in VALUES if name in sheet.columns)
     remedy = "one pair of columns for the value: re, im or abs, deg or db, deg; leave others out"
     require(pair in (("re", "im"), ("abs", "deg"), ("db", "deg")), "header", [*sheet.columns], remedy)
@@ -430,7 +430,7 @@ def _values(sheet: Sheet) -> Complex:
 
 # ------------------------------------------------------------ UFF
 def _of_uff(path: str, number: str, output: str, input: str) -> Measured:
-    """The response of a UFF file: the only one, or that of a number from 1 in their order there."""
+    """Return the response of a UFF file: the only one, or that of a number from 1 in their order there."""
     key = f"{output}/{input}"
     data = read_file(path, MOST_RECORD_BYTES, key=key, what="a .uff file")
     remedy = "is not installed, and reads UFF files: pip install 'tfarm[uff]', or export the response as CSV"

@@ -137,7 +137,7 @@ class RingdownFit:
 def fit_ringdown(
     recording: Recording, name: str, *, start: float | None = None, stop: float | None = None, modes: int = 1
 ) -> RingdownFit:
-    """Frequency and damping of the decay of one signal between two times [s] of the record.
+    """Return frequency and damping of the decay of one signal between two times [s] of the record.
 
     Raises ParameterError for a signal or times that are not there and for too few samples, ConvergenceError where the
     oscillations are not found.
@@ -210,7 +210,7 @@ def _samples(
 
 
 def by_part(t: Real, y: Real, poles: Complex) -> tuple[Real, Real]:
-    """w by a part of the record, from the whole's poles on, and its variance.
+    """Return w by a part of the record, from the whole's poles on, and its variance.
 
     Where the part does not determine it, w of the whole and an infinite variance.
     """
@@ -227,7 +227,7 @@ def by_part(t: Real, y: Real, poles: Complex) -> tuple[Real, Real]:
 
 
 def basis(poles: Complex, t: Real) -> Real:
-    """The decaying cosines and sines of the poles (n,) at times (samples,), and 1: (samples, 2 n + 1)."""
+    """Return the decaying cosines and sines of the poles (n,) at times (samples,), and 1: (samples, 2 n + 1)."""
     waves = np.exp(np.clip(np.outer(t, poles.real), -700, 700) + 1j * np.outer(t, poles.imag))
     return np.c_[waves.real, waves.imag, np.ones(t.size)]
 
@@ -268,7 +268,7 @@ class DampedSum:
         return self.e.size - count_parameters(self.poles.size)
 
     def covariance(self, *, is_white: bool) -> Real:
-        """Of the parameters (4 n + 1, 4 n + 1); the Jacobian's columns are scaled for the inverse's sake."""
+        """Return that of the parameters (4 n + 1, 4 n + 1); columns are scaled for the inverse's sake."""
         scale = np.sqrt((self.jacobian**2).sum(axis=0))
         J = self.jacobian / scale
         e = self.e
@@ -277,7 +277,7 @@ class DampedSum:
         return bread @ meat @ bread / np.outer(scale, scale)
 
     def mode(self, n: int, number: int, covariance: Real, halves: Sequence[float | None]) -> DecayMode:
-        """Mode n by its number, with intervals (Student's t); d zeta = (w^2 d sigma - sigma w d w)/|s|^3."""
+        """Return mode n by its number, with intervals (Student's t); d zeta = (w^2 d sigma - sigma w d w)/|s|^3."""
         s = complex(self.poles[n])
         size = abs(s)
         places = [n, n + self.poles.size]
@@ -297,7 +297,10 @@ class DampedSum:
 
 
 def nearest_sum(t: Real, y: Real, start: Complex) -> DampedSum | None:
-    """The sum with the least squares next to the poles of a start; None where that is no oscillation in the record."""
+    """Return the sum with the least squares next to the poles of a start.
+
+    None where that is no oscillation in the record.
+    """
     period = t[1] - t[0]
 
     def poles_at(x: Real) -> Complex:
@@ -315,7 +318,7 @@ def nearest_sum(t: Real, y: Real, start: Complex) -> DampedSum | None:
 
 
 def starting_poles(t: Real, y: Real, modes: int) -> Complex:
-    """Poles to start from: of ESPRIT's at several rates of sampling those with the least residuals, one by one.
+    """Return poles to start from: of ESPRIT's at several rates of sampling those with the least residuals, one by one.
 
     Of a rate they are ln of the eigenvalues by which the signal subspace of the Hankel matrix moves in one sample.
     There are fewer where not enough poles turn half a turn in the record, and neither die in a sample nor explode.
@@ -346,7 +349,7 @@ def starting_poles(t: Real, y: Real, modes: int) -> Complex:
 
 
 def _meat(J: Real, e: Real) -> Real:
-    """J' R J with the residuals' autocovariances r_k, tapered (1 - k/M), M twice the last significant lag."""
+    """Return J' R J with the residuals' autocovariances r_k, tapered (1 - k/M), M twice the last significant lag."""
     r = _autocovariance(e)
     most = max(2, e.size // 3)
     # deviations, 1/sqrt(n), of an autocorrelation of white noise
@@ -357,7 +360,7 @@ def _meat(J: Real, e: Real) -> Real:
 
 
 def whiteness(e: Real) -> float:
-    """The probability of autocorrelations as large as these in white noise (Ljung and Box 1978), of the first lags."""
+    """Return the probability of first autocorrelations as large as these in white noise (Ljung and Box 1978)."""
     r = _autocovariance(e)
     n = e.size
     if r[0] == 0:

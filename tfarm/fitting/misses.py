@@ -70,7 +70,7 @@ def misses_of(found: Solution) -> tuple[Miss, ...]:
     """Return the responses that a solution misses; none where noise of known size explains it."""
     if is_explained(found):
         return ()
-    pairs = zip(found.problem.responses, found.problem.computed(found.point), strict=True)
+    pairs = zip(found.problem.responses, found.problem.compute(found.point), strict=True)
     return tuple(miss for one, H in pairs if (miss := _miss(one, H)) is not None)
 
 

@@ -240,7 +240,7 @@ class Overlay:
         }
         if not ratios:
             return ()
-        table = modes_of(self.ratio.driven, max(ratios))
+        table = modes_of(self.ratio.driven_arm, max(ratios))
         found = []
         for name, slopes in table.sensitivity.items():
             for mode, ratio in ratios.items():
@@ -254,7 +254,7 @@ class Overlay:
 
 
 def overlay(arm: Arm, measured: Measured) -> Overlay:
-    """A measured response and the exact one of that arm.
+    """Return a measured response and the exact one of that arm.
 
     Raises ParameterError for signals that the arm does not have, and where the frequencies of the file are in another
     unit than its header has (see `must_be_in_unit`).
@@ -284,23 +284,23 @@ def overlay(arm: Arm, measured: Measured) -> Overlay:
         exact=ratio(1j * measured.omega),
         omega=omega,
         curve=ratio(1j * omega),
-        modes=_counterparts(ratio, roots, measured, noise, shown),
+        modes=counterparts(ratio, roots, measured, noise, shown),
         unmatched=np.delete(measured.omega[places], [i for i, _ in pairs]),
     )
 
 
-def _counterparts(
+def counterparts(
     ratio: Ratio, roots: RatioRoots, measured: Measured, noise: Noise, shown: list[tuple[complex, int | None]]
 ) -> tuple[Counterpart, ...]:
-    """A row a pole: of each pole [1/s] that is shown, with the place of its measured peak, if it has one.
+    """Return the rows of the poles [1/s] that are shown, each with the place of its measured peak, if it has one.
 
     The arm's modes are named where they are the poles of the ratio, each by the nearest natural frequency.
     """
     # of its frequency: how near a pole of a damped arm is to that mode of the arm without damping
     same = 0.1
     up_to = (1 + same) * max((abs(pole) for pole, _ in shown), default=0.0)
-    are_modes = ratio.is_driven and up_to > 0 and modes_below(ratio.driven, up_to) > 0
-    table = modes_of(ratio.driven, up_to=up_to) if are_modes else None
+    are_modes = ratio.is_driven and up_to > 0 and modes_below(ratio.driven_arm, up_to) > 0
+    table = modes_of(ratio.driven_arm, up_to=up_to) if are_modes else None
     found = []
     for pole, place in shown:
         mode = 0
@@ -311,12 +311,16 @@ def _counterparts(
         row = Counterpart(
             pole=pole, mode=mode or None, exact=size / HERTZ, damping_ratio=-pole.real / size + 0.0
         )
-        found.append(row if place is None else _seen(row, ratio.residue(pole, roots), measured, noise, place))
+        found.append(
+            row if place is None else with_peak(row, ratio.residue(pole, roots), measured, noise, place)
+        )
     return tuple(found)
 
 
-def _seen(row: Counterpart, residue: complex, measured: Measured, noise: Noise, place: int) -> Counterpart:
-    """The row of a pole with its measured peak, and the pole that is fitted there."""
+def with_peak(
+    row: Counterpart, residue: complex, measured: Measured, noise: Noise, place: int
+) -> Counterpart:
+    """Return the row of a pole with its measured peak, and the pole that is fitted there."""
     own = resonance_at(measured, noise.sigma, place)
     peak = float(measured.omega[place])
     at = peak if own is None else abs(own.pole)
@@ -356,7 +360,7 @@ class ResonanceShift(NamedTuple):
 
 
 def resonance_shifts(before: Arm, after: Arm, responses: Sequence[FitResponse]) -> list[ResonanceShift]:
-    """Each measured peak of all responses, with those of the arm before and after a fit.
+    """Return each measured peak of all responses, with those of the arm before and after a fit.
 
     A peak is a pole of its response: a natural frequency, with the hub held where the response is over the hub's angle.
     Of a response whose poles are not found completely no peak is listed.

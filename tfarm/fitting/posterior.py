@@ -202,7 +202,9 @@ class Repeats:
 
 
 def repeats(fit: Solution, fitted: Sequence[Fitted], draws: int = 40) -> Repeats | None:
-    """The scatter between the records of the response that there are most of; None where there are fewer than three.
+    """Return the scatter between the records of the response that there are most of.
+
+    None where there are fewer than three.
 
     Each least sum over some of the responses begins at that over all; sensors of the others are held, and so is what
     all together do not determine.

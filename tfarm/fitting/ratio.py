@@ -77,7 +77,7 @@ class Ratio:
             is_moving = each is None or each(0.37 + 0.73j)
             require(is_moving, key, name, "does not move on this arm: it is held")
         remedy = "drives no locked hub; name what was measured: hub_angle where the angle drives it, or another signal"
-        is_felt = not self.is_driven or not self.driven.is_locked or self.input == "hub_angle"
+        is_felt = not self.is_driven or not self.driven_arm.is_locked or self.input == "hub_angle"
         require(is_felt, "input", self.input, remedy)
 
     @property
@@ -86,7 +86,7 @@ class Ratio:
         return self.input in INPUTS
 
     @cached_property
-    def driven(self) -> Arm:
+    def driven_arm(self) -> Arm:
         """The arm under the input of the ratio: its own where the ratio is of two signals."""
         if self.is_driven:
             return replace(self.arm, input=cast("Input", self.input))
@@ -95,7 +95,7 @@ class Ratio:
     @cached_property
     def above(self) -> TransferFunction:
         """From the input that drives to the output."""
-        return transfer_to(self.driven, self.output)
+        return transfer_to(self.driven_arm, self.output)
 
     @cached_property
     def below(self) -> TransferFunction | None:
@@ -109,11 +109,11 @@ class Ratio:
         return unit_over(self.above.units[0], below)
 
     def __call__(self, s: Any) -> Any:
-        """H(s) at a complex scalar or array of s [1/s]."""
+        """Return H(s) at a complex scalar or array of s [1/s]."""
         return self.above(s) if self.below is None else self.above(s) / self.below(s)
 
     def roots(self, up_to: float) -> RatioRoots:
-        """Poles and zeros with |Im s| <= up_to [rad/s], as each transfer function has them, complete."""
+        """Return poles and zeros with |Im s| <= up_to [rad/s], as each transfer function has them, complete."""
         own_poles = upper_half(self.poles(up_to).values)
         own_zeros = upper_half(self.above.zeros(up_to=up_to).values)
         poles, zeros = without_cancelled(own_poles, own_zeros)
@@ -125,18 +125,18 @@ class Ratio:
             poles=poles,
             zeros=zeros,
             common=own_poles[~np.isin(own_poles, poles)],
-            at_zero=Signals(self.driven, (self.output,)).orders[0] - below,
+            at_zero=Signals(self.driven_arm, (self.output,)).orders[0] - below,
             up_to=up_to,
         )
 
     def poles(self, up_to: float) -> Roots:
-        """Its poles if the output had them all; with those at s = 0."""
+        """Return its poles if the output had them all; with those at s = 0."""
         if self.below is None:
             return self.above.poles(up_to=up_to)
         return self.below.zeros(up_to=up_to)
 
     def residue(self, pole: complex, roots: RatioRoots) -> complex:
-        """The residue at a simple pole: the mean of H (s - p) on a circle that no other of the roots is within.
+        """Return the residue at a simple pole: the mean of H (s - p) on a circle that no other of the roots is within.
 
         By the trapezoidal rule, whose error is (radius/distance)^16, 1e-10 at a quarter of it.
         """
@@ -165,7 +165,7 @@ def check_unit(arm: Arm, measured: Measured) -> None:
 
 
 def ratio_of(arm: Arm, measured: Measured) -> Ratio:
-    """The exact response of what was measured; ParameterError, naming it, where the arm has no such response."""
+    """Return the exact response of what was measured; ParameterError, naming it, where the arm has no such response."""
     try:
         return Ratio(arm, measured.output, measured.input)
     except ParameterError as error:

@@ -56,7 +56,7 @@ class Resonance:
 
 
 def peaks_of(data: Measured, sigma: Real) -> NDArray[np.intp]:
-    """The places (n,) of the peaks above the noise."""
+    """Return the places (n,) of the peaks above the noise."""
     from scipy.signal import find_peaks
 
     size = abs(data.values)
@@ -70,7 +70,7 @@ def peaks_of(data: Measured, sigma: Real) -> NDArray[np.intp]:
 def matched_peaks(
     measured: NDArray[Any], own: NDArray[Any], band: tuple[float, float]
 ) -> tuple[list[tuple[int, int]], float]:
-    """Pairs of places in two ascending rows of frequencies, in order, with the least cost, and that cost.
+    """Return pairs of places in two ascending rows of frequencies, in order, with the least cost, and that cost.
 
     The cost of a pair is |ln w/w'|; one of a row that is left alone costs UNPAIRED, but an own one outside of the band.
     Each has a partner of its own to be left alone with; of pairs that cross the same places in order cost no more.
@@ -89,7 +89,7 @@ def matched_peaks(
 
 
 def peaks_among(poles: Complex) -> Complex:
-    """Those poles (n,) [1/s] that make a peak, Im s > 0, by |s|."""
+    """Return those poles (n,) [1/s] that make a peak, Im s > 0, by |s|."""
     # a pole of a larger damping ratio is no peak
     upper = poles[(poles.imag > 0) & (-poles.real < 0.5 * abs(poles))]
     return upper[np.argsort(abs(upper))]
@@ -128,13 +128,13 @@ def must_be_in_unit(data: Measured, sigma: Real, poles: Complex) -> None:
 
 
 def project(columns: Real, y: Real) -> tuple[Real, Real]:
-    """The linear numbers of the least squares, and the residuals."""
+    """Return the linear numbers of the least squares, and the residuals."""
     linear = np.asarray(np.linalg.lstsq(columns, y, rcond=None)[0], dtype=float)
     return linear, y - columns @ linear
 
 
 def least_projected(columns: Callable[[Real], Real], y: Real, start: Real, **how: Any) -> Any:
-    """The numbers x, next to a start, for which columns(x) leave the least residuals of y."""
+    """Return the numbers x, next to a start, for which columns(x) leave the least residuals of y."""
     from scipy.optimize import least_squares
 
     def residuals(x: Real) -> Real:
@@ -144,7 +144,7 @@ def least_projected(columns: Callable[[Real], Real], y: Real, start: Real, **how
 
 
 def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
-    """The pole and residue of the peak at a place; None where its lines do not determine them."""
+    """Return the pole and residue of the peak at a place; None where its lines do not determine them."""
     kept = lines_of_peak(data, place)
     omega = data.omega[kept]
     sigma = sigma[kept]
@@ -157,7 +157,7 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
     powers = (s / w) ** np.arange(background)[:, None]
 
     def columns(x: Real) -> Real:
-        """Those of Re r, Im r and the c."""
+        """Return those of Re r, Im r and the c."""
         up = 1 / (s + x[0] - 1j * x[1])
         down = 1 / (s + x[0] + 1j * x[1])
         return in_parts(np.r_["0,2", up + down, 1j * (up - down), powers] / sigma).T

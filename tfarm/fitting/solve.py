@@ -83,7 +83,7 @@ def sum_of_squares(problem: Problem, point: Real) -> float:
 
 
 def equation_errors(problem: Problem, point: Real, share: float) -> Real:
-    """Real and imaginary parts of e at each frequency, and ln of each decay's frequency over the measured one."""
+    """Return both parts of e at each frequency, and ln of each decay's frequency over the measured one."""
     errors = []
     pairs = zip(problem.fractions(point), problem.fractions(point, share), problem.responses, strict=True)
     for (N, P, here), (smooth_N, smooth_P, there), each in pairs:
@@ -95,10 +95,10 @@ def equation_errors(problem: Problem, point: Real, share: float) -> Real:
 
 
 def with_gains(problem: Problem, point: Real) -> tuple[Problem, Real]:
-    """The problem with the sign of each sensor's gain as the data have it at a point; the point with its size."""
+    """Return the problem with the sign of each sensor's gain as the data have it, and the point with its size."""
     parameters = list(problem.parameters)
     point = point.copy()
-    for H, each in zip(problem.computed(point), problem.responses, strict=True):
+    for H, each in zip(problem.compute(point), problem.responses, strict=True):
         omega = each.data.omega
         ratio = each.data.values / H
         if each.delay is not None:
@@ -130,7 +130,7 @@ def aligning_delay(omega: Real, ratio: Complex) -> float:
 
 
 def thin_problem(problem: Problem, most: int = 400) -> Problem:
-    """The problem at a number of each response's frequencies at most."""
+    """Return the problem at a number of each response's frequencies at most."""
     responses = []
     for each in problem.responses:
         data = each.data
@@ -210,7 +210,9 @@ class Solution:
 
 
 def best_solution(problem: Problem, is_enough: Callable[[Solution], bool | None] | None = None) -> Solution:
-    """The least sum of squares over the starts; one that `is_enough` (by default of noise alone) ends the search early.
+    """Return the least sum of squares over the starts.
+
+    One that `is_enough` (by default of noise alone) ends the search early.
 
     Where something is left open the valleys are wide, and the equation errors may lead into the wrong one: a pole that
     is there only between two lines.  Then the fit's own start is tried too.
@@ -235,7 +237,7 @@ def best_solution(problem: Problem, is_enough: Callable[[Solution], bool | None]
 
 
 def nearest_to_start(found: Solution) -> Solution:
-    """The solution with those directions open that the data do not exclude to be so, at the point nearest to the start.
+    """Return the solution with all directions open that the data allow to be so, at the point nearest to the start.
 
     A valley may be open where the search began and closed where it ended, where noise exceeds an effect too small to be
     measured (the rotary inertia of E I).  The point moves only where the sum of squares stays what it is.
@@ -263,19 +265,19 @@ def nearest_to_start(found: Solution) -> Solution:
 
 
 def principal_axes(jacobian: Real) -> tuple[Real, Real]:
-    """The change of the residuals by a unit step along each axis (parameters,), largest first, and the axes (rows)."""
+    """Return the change of the residuals by a unit step along each axis (parameters,), and the axes (rows)."""
     padded = np.vstack([jacobian, np.zeros((jacobian.shape[1],) * 2)])
     return np.linalg.svd(padded, full_matrices=False)[1:]
 
 
 def open_axes(jacobian: Real, deviation: float = OPEN_DEVIATION) -> Real:
-    """The axes (rows) along which the data leave more than that deviation of ln p."""
+    """Return the axes (rows) along which the data leave more than that deviation of ln p."""
     sizes, axes = principal_axes(jacobian)
     return axes[sizes < 1.0 / deviation]
 
 
 def is_explained(one: Solution) -> bool | None:
-    """Whether noise alone gives such a sum often enough; None where its size was taken from the residuals."""
+    """Return whether noise alone gives such a sum often enough; None where its size was taken from the residuals."""
     if not one.has_known_noise:
         return None
     # the probability of a sum of squares by noise alone
