@@ -365,7 +365,8 @@ def _plant(plant: Plant) -> LiveNumbers:
 
 def _orders(plant: Plant) -> list[int]:
     """Return the order of the pole of each output at s = 0."""
-    return [2 if twice else 1 if once else 0 for twice, once in plant.rigid.tolist()]
+    twice, once = (plant.rigid != 0).T
+    return np.where(twice, 2, once).tolist()
 
 
 def _pairs(values: Complex) -> list[list[float]]:

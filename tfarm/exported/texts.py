@@ -38,13 +38,18 @@ def identifiers(names: Iterable[str], prefix: str, longest: int = 31) -> dict[st
 def comment(words: str) -> str:
     """Return one line of printable ASCII that ends no comment of C and continues none."""
     plain = unicodedata.normalize("NFKD", words)
-    line = "".join(
-        c if " " <= c <= "~" else " " if c.isspace() else "?" for c in plain if not unicodedata.combining(c)
-    )
+    line = "".join(printable(c) for c in plain if not unicodedata.combining(c))
     # marks of C, and the trigraph of a backslash
     for mark, instead in (("\\", "|"), ("*/", "* /"), ("/*", "/ *"), ("??/", "? ?/")):
         line = line.replace(mark, instead)
     return line[:200].strip()
+
+
+def printable(character: str) -> str:
+    """Return a character of printable ASCII for any other one."""
+    if " " <= character <= "~":
+        return character
+    return " " if character.isspace() else "?"
 
 
 def matlab_text(words: str) -> str:

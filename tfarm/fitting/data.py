@@ -87,9 +87,11 @@ class Measured:
             "frequency", w, np.isfinite(self.values), "has a value that is no number; leave the row out"
         )
         require(self.values.any(), f"{self.name} values", 0.0, nothing)
-        if (sigma := self.sigma) is not None:
+        sigma = self.sigma
+        if sigma is not None:
             require_all("sigma", sigma, (sigma > 0) & np.isfinite(sigma), "a standard deviation is positive")
-        if (coherence := self.coherence) is not None:
+        coherence = self.coherence
+        if coherence is not None:
             require_all("coherence", coherence, (coherence >= 0) & (coherence <= 1), "between 0 and 1")
             require(coherence.any(), "coherence", 0.0, f"{nothing}; leave it out")
 
@@ -133,22 +135,17 @@ class Measured:
     @property
     def csv_table(self) -> Table:
         """A row a frequency, in the columns that `read_measured` reads."""
-        columns = {
-            "re": self.values.real,
-            "im": self.values.imag,
-            "sigma": self.sigma,
-            "coherence": self.coherence,
-        }
-        titles = {"re": f"Re {self.name}", "im": f"Im {self.name}"}
         rows = [Column("hz", "frequency", "Hz", of=self.omega / HERTZ, digits=singly(general, 9))]
-        rows += [
-            Column(key, titles.get(key, key), of=x, digits=singly(general, 6))
-            for key, x in columns.items()
-            if x is not None
-        ]
-        rows += [Column("averages", "averages", of=[self.averages] * self.points)] * (
-            self.averages is not None
-        )
+        for key, title, of in (
+            ("re", f"Re {self.name}", self.values.real),
+            ("im", f"Im {self.name}", self.values.imag),
+            ("sigma", "sigma", self.sigma),
+            ("coherence", "coherence", self.coherence),
+        ):
+            if of is not None:
+                rows.append(Column(key, title, of=of, digits=singly(general, 6)))
+        if self.averages is not None:
+            rows.append(Column("averages", "averages", of=[self.averages] * self.points))
         return Table(columns=tuple(rows))
 
 
@@ -445,7 +442,7 @@ def _of_uff(path: str, number: str, output: str, input: str) -> Measured:
         place = int(number or 1)
         require(1 <= place <= count, "data set", place, f"from 1 to {count}, the responses of the file")
         omega = 2 * np.pi * np.asarray(found[f"x{place - 1}"], dtype=float)
-        values: NDArray[Any] = np.asarray(found[f"data{place - 1}"], dtype=complex)
+        values = found[f"data{place - 1}"]
         # the line at 0 Hz that spectra begin with
         kept = slice(int(omega.size > 0 and omega[0] == 0), None)
         return Measured(

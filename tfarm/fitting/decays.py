@@ -163,15 +163,18 @@ def fit_ringdown(
             "by their autocovariance, and may be too narrow, above all if the residuals are no noise"
         )
     spread = found.covariance(is_white=white >= NOT_WHITE)
-    halves = zip(np.array_split(t, [t.size // 2]), np.array_split(y, [t.size // 2]), strict=True)
-    w, variance = np.swapaxes([by_part(*half, found.poles) for half in halves], 0, 1)
-    apart = np.sqrt(variance.sum(axis=0))
+    middle = t.size // 2
+    w1, variance1 = by_part(t[:middle], y[:middle], found.poles)
+    w2, variance2 = by_part(t[middle:], y[middle:], found.poles)
+    apart = np.sqrt(variance1 + variance2)
     # by more than four standard deviations
-    is_drifting = abs(np.subtract(*w)) > 4.0 * apart + rounding * found.poles.imag
+    is_drifting = abs(w1 - w2) > 4.0 * apart + rounding * found.poles.imag
     rows = []
     for number, n in enumerate(np.argsort(-found.energy, kind="stable").tolist(), start=1):
-        first, second = (w[:, n] / HERTZ).tolist()
-        rows.append(found.mode(n, number, spread, (first, second) if np.isfinite(apart[n]) else (None, None)))
+        first = float(w1[n]) / HERTZ
+        second = float(w2[n]) / HERTZ
+        halves = (first, second) if np.isfinite(apart[n]) else (None, None)
+        rows.append(found.mode(n, number, spread, halves))
         if is_drifting[n]:
             notes.append(
                 f"mode {number} rings at {first:.4g} Hz in its first half, {second:.4g} Hz in its "

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -233,11 +233,7 @@ class Overlay:
         It is exp(ln(measured/exact)/S) - 1 with S = d ln w/d ln p: exact for a power law, as of Young's modulus or the
         density, else to first order.  Without factors beyond 3, or of a number that hardly moves the mode.
         """
-        ratios = {
-            row.mode: row.frequency_ratio
-            for row in self.modes
-            if row.mode and row.frequency_ratio is not None
-        }
+        ratios = {row.mode: row.frequency_ratio for row in self.modes if row.mode and row.frequency_ratio}
         if not ratios:
             return ()
         table = modes_of(self.ratio.driven_arm, max(ratios))
@@ -325,22 +321,16 @@ def with_peak(
     peak = float(measured.omega[place])
     at = peak if own is None else abs(own.pole)
     share = at / abs(row.pole)
-    found: dict[str, Any] = {
-        "peak": peak,
-        "frequency": at / HERTZ,
-        "frequency_ratio": share,
-        "off": 100 * (share - 1),
-    }
+    row = replace(row, peak=peak, frequency=at / HERTZ, frequency_ratio=share, off=100 * (share - 1))
     if own is None:
-        return replace(row, **found, is_peak_only=True)
+        return replace(row, is_peak_only=True)
     of_damping, of_frequency = own.std.tolist()
     level = own.residue / residue if residue else 0.0
     if level:
-        degrees = math.degrees(np.angle(level))
-        found |= {"level": level, "level_db": 20 * math.log10(abs(level)), "level_degrees": degrees}
+        decibels = 20 * math.log10(abs(level))
+        row = replace(row, level=level, level_db=decibels, level_degrees=math.degrees(np.angle(level)))
     return replace(
         row,
-        **found,
         measured=own,
         frequency_std=of_frequency / HERTZ,
         measured_damping=own.damping_ratio,
@@ -369,10 +359,8 @@ def resonance_shifts(before: Arm, after: Arm, responses: Sequence[FitResponse]) 
     for one in responses:
         data = one.data
         with suppress(ConvergenceError):
-            old, new = (
-                peaks_among(Ratio(arm, data.output, data.input).poles(PARTNERS_BEYOND * data.band[1]).values)
-                for arm in (before, after)
-            )
+            up_to = PARTNERS_BEYOND * data.band[1]
+            old, new = (peaks_among(ratio_of(arm, data).poles(up_to).values) for arm in (before, after))
             w = abs(new)
             peaks = data.omega[peaks_of(data, one.noise.sigma)]
             places = dict(matched_peaks(peaks, w, data.band)[0])
@@ -382,8 +370,9 @@ def resonance_shifts(before: Arm, after: Arm, responses: Sequence[FitResponse]) 
                 own = places.get(n, abs(np.log(w / peak)).argmin() if w.size else None)
                 # of ln w: a peak farther from all of the arm's is none of them, a broad one by twice its damping ratio
                 if own is not None and abs(math.log(w[own] / peak)) < 0.1 - 2.0 * new[own].real / w[own]:
-                    start = float(abs(old[earlier[own]])) / HERTZ if own in earlier else None
                     end = float(w[own]) / HERTZ
+                    if own in earlier:
+                        start = float(abs(old[earlier[own]])) / HERTZ
                 # peaks of two responses that are nearer, of ln w, are one
                 found[data.input, round(math.log(peak) / 0.02)] = ResonanceShift(start, end, peak / HERTZ)
     return sorted(found.values(), key=lambda row: row.measured)

@@ -103,14 +103,16 @@ class Posterior(StrictTable):
         x_r = np.empty((len(known), len(normal)))
         for row, n in zip(x_r, known, strict=True):
             of = self.numbers[n]
-            p = np.asarray(ranged[of.key])
-            row[:] = (p - of.value) / of.size if of.size else np.log(np.maximum(p / of.value, LEAST_SIZE))
+            p = ranged[of.key]
+            if of.size:
+                row[:] = (p - of.value) / of.size
+            else:
+                row[:] = np.log(np.maximum(p / of.value, LEAST_SIZE))
         # unique: independent of the processor
         L = np.linalg.cholesky(P[np.ix_(rest, rest)])
         x_o = np.linalg.solve(L.T, normal.T - np.linalg.solve(L, P[np.ix_(rest, known)] @ x_r)).T
-        value, size = np.transpose([(self.numbers[n].value, self.numbers[n].size) for n in rest]).reshape(
-            2, -1
-        )
+        value = np.array([self.numbers[n].value for n in rest])
+        size = np.array([self.numbers[n].size for n in rest])
         return np.where(size > 0, value + size * x_o, value * np.exp(x_o))
 
 

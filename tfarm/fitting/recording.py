@@ -104,10 +104,10 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
     name = os.fspath(path)
     if name.lower().endswith(".mat"):
         found, data = read_mat(name, MOST_RECORD_BYTES, key="record")
-        numbers = {
-            each: value for each, value in found.items() if value.ndim == 2 and value.dtype.kind in "biuf"
-        }
-        held = {each: value.astype(float) for each, value in numbers.items()}
+        held = {}
+        for each, value in found.items():
+            if value.ndim == 2 and value.dtype.kind in "biuf":
+                held[each] = value.astype(float)
         units = dict.fromkeys(held, "")
         digest = hashlib.sha256(data).hexdigest()
     else:
@@ -366,7 +366,8 @@ def frequency_response(
     names = columns or (output, input)
     y = recording.signal(names[0], "--output")
     x = recording.signal(names[1], "--input")
-    overlap = 0.5 * (window == "hann") if overlap is None else overlap
+    if overlap is None:
+        overlap = 0.5 * (window == "hann")
     size, step = segment_size(recording, segment, overlap)
     how = {"window": window, "nperseg": size, "noverlap": size - step}
     lines, values, coherence = averaged_response(estimator, x, y, how)
@@ -406,9 +407,9 @@ def averaged_response(
     """
     from scipy.signal import csd, welch
 
-    S_xx = welch(x, **how)[1]
-    S_xy = csd(x, y, **how)[1]
-    S_yy = welch(y, **how)[1]
+    _, S_xx = welch(x, **how)
+    _, S_xy = csd(x, y, **how)
+    _, S_yy = welch(y, **how)
     lines = np.arange(1, S_xx.size - 1)
     # of the largest line of the input: below it there are rounding errors alone
     lines = lines[S_xx[lines] > 1e-24 * S_xx.max()]
@@ -416,14 +417,15 @@ def averaged_response(
     S_yy = S_yy[lines]
     cross = abs(S_xy[lines])
     with np.errstate(divide="ignore", invalid="ignore"):
-        sizes = {
-            "H1": cross / S_xx,
-            "H2": np.where(cross == 0, 0.0, S_yy / cross),
-            "Hv": np.sqrt(S_yy / S_xx),
-        }
+        if estimator == "H1":
+            size = cross / S_xx
+        elif estimator == "H2":
+            size = np.where(cross == 0, 0.0, S_yy / cross)
+        else:
+            size = np.sqrt(S_yy / S_xx)
         phase = np.where(cross == 0, 1.0, S_xy[lines] / cross)
         coherence = np.where(S_yy > 0, cross**2 / (S_xx * S_yy), 0.0)
-    return lines, sizes[estimator] * phase, np.clip(coherence, 0.0, 1.0)
+    return lines, size * phase, np.clip(coherence, 0.0, 1.0)
 
 
 def independent_averages(w: Real, step: int, count: int) -> float:

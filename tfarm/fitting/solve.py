@@ -47,7 +47,7 @@ def start_by(problem: Problem, draws: int, shares: Sequence[float]) -> tuple[Pro
         thin = thin_problem(whole)
         found = least_equation_errors(thin, first, share)
         point = found.x
-    _, sizes, axes = np.linalg.svd(np.asarray(found.jac), full_matrices=False)
+    _, sizes, axes = np.linalg.svd(found.jac, full_matrices=False)
     deviation = math.sqrt(2 * found.cost / found.fun.size) / sizes
     drawn = np.random.default_rng(FIT_SEED).standard_normal((draws, point.size)) * 2.0 * deviation
     tried = (point, *map(thin.inside, point + drawn @ axes))
