@@ -204,7 +204,9 @@ def _samples(case: Case, corners: Sequence[Case], unit: Law | None) -> tuple[Liv
     arm = case.arm
     band, is_quiet = band_of_family(map(ContinuousLoop, corners))
     samples = loop_panels(arm, band, None if unit is None else ContinuousLoop(case.under(unit)))
-    own = [abs(s) for block in _blocks(unit) for s in (*block.poles, *block.zeros) if s] if unit else []
+    own: list[float] = []
+    for block in _blocks(unit) if unit else ():
+        own += [abs(s) for s in (*block.poles, *block.zeros) if s]
     return {
         # by panel, part and point
         "samples": pack_doubles(samples.values.transpose(1, 0, 2)),
@@ -273,11 +275,12 @@ def _stable_moments(arm: Arm) -> list[float | None]:
 
 def _areas(plane: Plane | GainMap) -> list[dict[str, float]]:
     """Return rows across, low, high of the parts of the stable region, each part with its number."""
-    return [
-        {"part": number, PLANE[0]: x, "low": low, "high": high}
-        for number, piece in enumerate(pieces(plane.x, plane.stable_intervals))
-        for x, low, high in (kept_digits(point, 7) for point in piece.points)
-    ]
+    rows = []
+    for number, piece in enumerate(pieces(plane.x, plane.stable_intervals)):
+        for point in piece.points:
+            x, low, high = kept_digits(point, 7)
+            rows.append({"part": number, PLANE[0]: x, "low": low, "high": high})
+    return rows
 
 
 # ------------------------------------------------------------ at the samples

@@ -143,7 +143,7 @@ class Export:
 
 def names_of(*mappings: Mapping[str, str]) -> list[Name]:
     """Return the names of `identifiers` as rows."""
-    return [Name(name, identifier) for mapping in mappings for name, identifier in mapping.items()]
+    return [Name(*pair) for mapping in mappings for pair in mapping.items()]
 
 
 def write_into(folder: Path, contents: Mapping[str, bytes]) -> None:

@@ -293,7 +293,9 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
 def py(task: ExportTask) -> Export:
     """Return the script of a task."""
     found = linear(task)
-    every = [name for each in found.systems.values() for name in (*each.inputs, *each.outputs)]
+    every: list[str] = []
+    for each in found.systems.values():
+        every += (*each.inputs, *each.outputs)
     changed = {name: new for name, new in zip(every, without_dots(every), strict=True) if new != name}
     contents = {f"{task.what}.py": render_source("systems.txt", of=found, listed=list_literal)}
     return task.export_of(contents, names_of(changed), found.verdict)

@@ -423,9 +423,9 @@ class ResponseBand(NamedTuple):
 
 def response_band(fit: Fit, arms: Sequence[Arm], output: str) -> ResponseBand:
     """Return the band of a response over these arms, in the range of all measurements."""
-    ends = [end for each in fit.responses for end in each.band]
+    bands = np.array([each.band for each in fit.responses])
     # about one frequency to a pixel
-    omega = np.geomspace(min(ends), max(ends), 800)
+    omega = np.geomspace(bands.min(), bands.max(), 800)
     best, *others = (abs(transfer(each, output)(1j * omega)) for each in (fit.arm, *arms))
     return ResponseBand(omega, best, np.min(others, axis=0), np.max(others, axis=0))
 

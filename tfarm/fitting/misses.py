@@ -132,14 +132,12 @@ def _tries(found: Solution) -> Iterator[tuple[str, Solution]]:
         if min(values) < 0 and key == SENSOR_GAIN:
             pairs = list(zip(problem.responses, values, strict=True))
             names = [each.data.name for each, value in pairs if value < 0]
-            turned = (
-                replace(each, data=replace(each.data, values=np.sign(x) * each.data.values))
-                for each, x in pairs
-            )
-            yield (
-                f"the other sign of {join_words(names)}",
-                search_without_miss(replace(problem, responses=tuple(turned))),
-            )
+            turned = []
+            for each, x in pairs:
+                data = replace(each.data, values=np.sign(x) * each.data.values)
+                turned.append(replace(each, data=data))
+            there = search_without_miss(replace(problem, responses=tuple(turned)))
+            yield f"the other sign of {join_words(names)}", there
     yield from _beyond_bounds(found)
 
 

@@ -226,8 +226,9 @@ def repeats(fit: Solution, fitted: Sequence[Fitted], draws: int = 40) -> Repeats
 
     def numbers(chosen: Sequence[int]) -> Real:
         some = (*(records[n] for n in chosen), *others)
-        sensors = {place for each in some for place in (each.gain, each.delay)}
-        used = identified.keys() & {*sensors, *range(len(own.of_the_arm))}
+        gains = [each.gain for each in some]
+        delays = [each.delay for each in some]
+        used = identified.keys() & {*gains, *delays, *range(len(own.of_the_arm))}
         held = {n: float(x) for n, x in enumerate(fit.point) if n not in used}
         point = nearest_minimum(replace(own, responses=some), fit.point, held).point
         return np.array([own.value(point, n) for n in known])
