@@ -27,6 +27,7 @@ from tfarm.dsp.simulate import quantisers
 from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.exported import controller, fmu, live_loop, tuner_code
 from tfarm.exported.controller import c_controller
+from tfarm.exported.kernel import Status
 from tfarm.exported.result import write_into
 from tfarm.loop.sampled import sampled_loop
 from tfarm.report.blocks import TEMPLATES
@@ -156,7 +157,7 @@ def test_the_controller_in_c(stages, tmp_path):
     names = [*own.signals, *(f"{REFERENCE}{name}" for name in own.references), "feedforward"]
     found, status = stepped(tmp_path, own, np.stack([columns[name] for name in names], axis=1), "gcc", "-O2")
     assert_equal(found, truth.torque, quantisers(chain)[DAC, 0])
-    assert ((status == controller.SATURATED) == truth.saturated_at[:, DAC]).all()
+    assert ((status == Status.SATURATED) == truth.saturated_at[:, DAC]).all()
 
 
 @vectors(tuner.CONSUMER)

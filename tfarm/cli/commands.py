@@ -306,7 +306,7 @@ def fit(
     report: write the pages of the fitted arm
     out: the folder of the pages
     """
-    from tfarm.fitting import model, overlay
+    from tfarm.fitting import model, ratio
     from tfarm.fitting.data import data_of
     from tfarm.fitting.fit import save_fit
 
@@ -314,7 +314,7 @@ def fit(
     measured = [data_of(text) for text in data or []]
     page = None
     for each in measured:
-        overlay.check_unit(subject, each)
+        ratio.check_unit(subject, each)
     found = tfarm.fit(
         subject,
         measured,

@@ -32,9 +32,9 @@ from tfarm.dsp.discretise import acting_law, with_estimate
 from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, arm_under_chain, sensed_plant
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import require
+from tfarm.exported.realisations import close_state_space
 from tfarm.exported.result import Export, ExportTask, names_of
 from tfarm.exported.texts import comment, matlab_text, render_source
-from tfarm.exported.word_length import close_state_space
 from tfarm.files import is_standard_output, mat_content, write_file
 from tfarm.records import frozen
 from tfarm.reduced import BAND, ReducedModel, modal_model, reduce
@@ -228,7 +228,7 @@ def linear(task: ExportTask) -> Linear:
 def mat(task: ExportTask) -> Export:
     """Return the MATLAB file of a task and its script."""
     found = linear(task)
-    return task.exported(mat_files(f"{task.what}.mat", found), [], found.verdict)
+    return task.export_of(mat_files(f"{task.what}.mat", found), [], found.verdict)
 
 
 def mat_files(name: str, of: Linear) -> dict[str, bytes]:
@@ -293,10 +293,12 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
 def py(task: ExportTask) -> Export:
     """Return the script of a task."""
     found = linear(task)
-    every = [name for each in found.systems.values() for name in (*each.inputs, *each.outputs)]
+    every: list[str] = []
+    for each in found.systems.values():
+        every += (*each.inputs, *each.outputs)
     changed = {name: new for name, new in zip(every, without_dots(every), strict=True) if new != name}
     contents = {f"{task.what}.py": render_source("systems.txt", of=found, listed=list_literal)}
-    return task.exported(contents, names_of(changed), found.verdict)
+    return task.export_of(contents, names_of(changed), found.verdict)
 
 
 def without_dots(names: Iterable[str]) -> list[str]:
