@@ -12,10 +12,6 @@ from typing import Any, NamedTuple
 
 from tfarm.errors import ParameterError
 
-NAMED = "named"
-PARTLY = "partly"
-NONE = "none"
-
 
 class Stage(NamedTuple):
     """A stage, the keys of an arm's file that it acts by, its equation, its meaning, and whether it is linear.
@@ -178,16 +174,15 @@ class Consumer(NamedTuple):
     none: tuple[str, ...] = ()
 
     def word(self, stage: str) -> str | None:
-        """What it does with a stage; None for one that it refuses."""
-        acts = "acts"
-        return next((word for word in (acts, NAMED, PARTLY, NONE) if stage in getattr(self, word)), None)
+        """Return what it does with a stage, as the field that names it; None for one that it refuses."""
+        words = self._fields[1:]
+        return next((word for word in words if stage in getattr(self, word)), None)
 
     def refuse_others(self, *tables: Mapping[str, Any]) -> None:
         """Raise ParameterError for a key of tables of a file whose stage it does not state, or that no stage has."""
-        stated = {*self.acts, *self.named, *self.partly, *self.none}
         for key, value in flat_keys(*tables):
             stage = STAGE_OF.get(key)
-            if stage is None or stage.name not in stated:
+            if stage is None or self.word(stage.name) is None:
                 what = f"the stage {stage.name}" if stage else "this key"
                 raise ParameterError(
                     key=key, value=value, remedy=f"{self.name} does not have {what}: leave it out"
@@ -195,9 +190,11 @@ class Consumer(NamedTuple):
 
     def not_covered(self, *tables: Mapping[str, Any]) -> str:
         """Return the end of its line of certainty: the keys of these tables that it is without."""
-        found = [(key, STAGE_OF[key]) for key, _ in flat_keys(*tables)]
-        without = [each for each in found if self.word(each[1].name) in (NAMED, PARTLY)]
-        names = [stage.remainder or key.partition(".")[2] for key, stage in without]
+        names = []
+        for key, _ in flat_keys(*tables):
+            stage = STAGE_OF[key]
+            if self.word(stage.name) in ("named", "partly"):
+                names.append(stage.remainder or key.partition(".")[2])
         return f"; not covered: {', '.join(names)}" if names else ""
 
 
@@ -207,7 +204,7 @@ def are_linear(*tables: Mapping[str, Any]) -> bool:
 
 
 def flat_keys(*tables: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]]:
-    """Each key of tables in tables, with its place, and its value."""
+    """Yield each key of tables in tables, with its place, and its value."""
     for table in tables:
         for key, value in table.items():
             for each in value if isinstance(value, list) else [value]:

@@ -95,9 +95,8 @@ def _on_axis(frequencies: NDArray[np.float64], at_zero: int, up_to: float) -> Ro
 
 def _near_poles(arm: Arm, up_to: float) -> Complex:
     """Return estimates of an arm's poles, and real starts."""
-    return np.r_[
-        damped_starts(arm, flexible_frequencies(arm, 1.5 * up_to)), np.linspace(-up_to, -up_to / 50, 40)
-    ]
+    starts = damped_starts(arm, flexible_frequencies(arm, 1.5 * up_to))
+    return np.r_[starts, np.linspace(-up_to, -up_to / 50, 40)]
 
 
 def _starts_by_sampling(size_at: Callable[[Complex], Real], up_to: float) -> Complex:
@@ -127,22 +126,20 @@ def _in_box(k: System, function: Function, at_zero: int, up_to: float, starts: C
     """Return the zeros of a function in a box of that height; the box grows where a zero lies on its edge."""
 
     def box_of(height: float) -> Box:
-        return Box(
-            -min(TOWARD_SINGULAR / k.damping, height) if k.damping else -height, height, -height, height
-        )
+        reach = min(TOWARD_SINGULAR / k.damping, height) if k.damping else height
+        return Box(-reach, height, -height, height)
 
     found, box = complete_zeros(function, box_of, up_to, starts)
     # zeros come in +- pairs too
     if k.is_undamped:
         found = np.where(abs(found.real) < REAL_SHARE * abs(found), 1j * found.imag, found)
-    found = found[np.lexsort((-found.imag, found.real.round(9), abs(found.imag).round(9)))]
+    order = np.lexsort((-found.imag, found.real.round(9), abs(found.imag).round(9)))
+    found = found[order]
     return Roots(np.r_[np.zeros(at_zero, complex), found], (*box,), "winding number")
 
 
 if TYPE_CHECKING:
     import control
-
-A_FREQUENCY = "a positive, finite frequency in rad/s"
 
 
 # one output or several
@@ -296,7 +293,8 @@ class TransferFunction:
 
     def _shaped(self, values: NDArray[Any]) -> Any:
         """Return values (outputs, ...) without the first axis for a single output, a scalar as a Python number."""
-        values = values[0] if self.is_single else values
+        if self.is_single:
+            values = values[0]
         return values if np.ndim(values) else values.item()
 
     # ------------------------------------------------------------ s = 0, poles and zeros
@@ -324,7 +322,7 @@ class TransferFunction:
         mode.  At C > 0 they are complete by the winding number of the characteristic function.
         """
         k = self.system
-        up_to = positive("up_to", up_to, A_FREQUENCY)
+        up_to = _known_height(up_to)
         if self.arm.is_undamped:
             return _on_axis(flexible_frequencies(self.arm, up_to), k.at_rest, up_to)
         starts = _near_poles(self.arm, up_to)
@@ -337,7 +335,7 @@ class TransferFunction:
         """
         self.must_be_of_the_hub("zeros")
         require(self.is_single, "outputs", self.outputs, "zeros are those of one output; give one")
-        return zeros_of(self.arm, self.rows[0], positive("up_to", up_to, A_FREQUENCY), self.share)
+        return zeros_of(self.arm, self.rows[0], _known_height(up_to), self.share)
 
     # ------------------------------------------------------------ inside
 
@@ -352,7 +350,13 @@ class TransferFunction:
         return 0.0 if self.x is None else self.x / self.arm.length
 
 
+def _known_height(up_to: float) -> float:
+    """Return the height of a box.  Raises ParameterError for another value."""
+    return positive("up_to", up_to, "a positive, finite frequency in rad/s")
+
+
 def _finite(s: ArrayLike) -> Complex:
+    """Return the points s [1/s] as an array.  Raises ParameterError for NaN and beyond 1e20."""
     points = np.asarray(s, dtype=complex)
     # without an array of a million sizes
     ends = [end(part, initial=0.0) for part in (points.real, points.imag) for end in (np.min, np.max)]
@@ -411,14 +415,14 @@ class TransferPoints:
         """A row for each point."""
         first = roots_table(self.s, Quantity("s", "1 / s", 12)).columns
         value = self.value
-        pairs: Iterable[Any]
+        parts: Iterable[Any]
         if isinstance(value, list):
-            pairs = zip(*value, strict=True)
+            parts = zip(*value, strict=True)
         else:
-            pairs = (value.real.tolist(), value.imag.tolist())
+            parts = value.real, value.imag
         values = (
-            Column(f"{part}_{self.output}", f"{part} {self.output}", self.gain_unit, of=list(of))
-            for part, of in zip(("re", "im"), pairs, strict=True)
+            Column(f"{part}_{self.output}", f"{part} {self.output}", self.gain_unit, of=of)
+            for part, of in zip(("re", "im"), parts, strict=True)
         )
         names = (Column(f"{each.key}_s", each.title, "1/s", of=each.of, shown=each.shown) for each in first)
         return Table(columns=(*names, *values))
@@ -431,7 +435,7 @@ def values_at(G: TransferFunction, s: Complex, digits: int | None = None) -> Tra
     if right <= DOUBLE_DIGITS:
         value = np.asarray(G(s))
     else:
-        value = [list(G.digits(complex(each), right)) for each in s]
+        value = [list(G.digits(each, right)) for each in s.tolist()]
     return TransferPoints(
         s, value, G.arm.name, G.input, G.input_unit, G.outputs[0], G.units[0], G.x, G.method
     )
