@@ -358,10 +358,10 @@ def of_common_blocks(law: Law) -> Law:
         is_shared = part.block.order and part.block.excess <= 0
         key = getattr(part.block, "den", id(part)) if is_shared else id(part)
         alike.setdefault(key, []).append(part)
-    return replace(law, parts=tuple(map(_common, alike.values())))
+    return replace(law, parts=tuple(map(_merge, alike.values())))
 
 
-def _common(parts: Sequence[Part]) -> Part:
+def _merge(parts: Sequence[Part]) -> Part:
     """Return ratios of the same denominator as one block, in observable form: the transpose of each one's states."""
     if len(parts) == 1:
         return parts[0]

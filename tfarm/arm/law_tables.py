@@ -86,9 +86,7 @@ def law_of_table(table: Any, folder: Path) -> Law:
         remedy = f"a signal has a table of its own: [law.{key}] with gain = {value}"
         require(not is_signal, f"law.{key}", value, remedy)
     head = validate_table(LawTable, others, "law")
-    common = head.model_dump(
-        include={"name", "input", "delay", "period", "sign", "references", "rule", "prewarp"}
-    )
+    common = head.model_dump(exclude={"matrices", "system", "signals", "scales"})
     try:
         if head.matrices is not None:
             remedy = "either matrices and signals, or a table for each signal"

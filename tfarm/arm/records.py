@@ -13,7 +13,6 @@ from tfarm.arm.checks import (
     INPUTS,
     THEORIES,
     WITH_ROTARY_INERTIA,
-    WITH_SHEAR,
     Input,
     Theory,
     plain_name,
@@ -220,7 +219,7 @@ class Arm:
     @property
     def has_cutoff(self) -> bool:
         """Whether `shear_cutoff` applies: in Timoshenko's theory alone."""
-        return self.theory in WITH_SHEAR and self.theory in WITH_ROTARY_INERTIA
+        return self.theory == "timoshenko"
 
     # ------------------------------------------------------------ rigid body and motor, at the hub
 

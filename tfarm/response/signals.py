@@ -36,17 +36,17 @@ class Signals:
     names: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        require(self._placed, "signals", [], "name at least one output")
+        require(self._places_by_output, "signals", [], "name at least one output")
 
     @property
     def outputs(self) -> tuple[Output, ...]:
         """The output of each signal."""
-        return tuple(wanted for wanted, _ in self._placed)
+        return tuple(wanted for wanted, _ in self._places_by_output)
 
     @cached_property
     def places(self) -> tuple[float, ...]:
         """The place of each as a share of the length; 0 for outputs with a fixed place."""
-        return tuple(place / self.arm.length for _, place in self._placed)
+        return tuple(place / self.arm.length for _, place in self._places_by_output)
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -102,7 +102,7 @@ class Signals:
         return tuple(order_at_zero(self.system, wanted, share) for wanted, share in pairs)
 
     @cached_property
-    def _placed(self) -> tuple[tuple[Output, float], ...]:
+    def _places_by_output(self) -> tuple[tuple[Output, float], ...]:
         """The output of each name and its place [m]."""
         return tuple(locate_output(name, self.arm.length) for name in self.names)
 

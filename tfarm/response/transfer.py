@@ -70,7 +70,7 @@ def zeros_of(arm: Arm, wanted: Output, up_to: float, x: float) -> Roots:
     constant = constant_of(k, wanted, share)
     if constant is not None:
         at_zero = wanted.power if constant else 0
-        return Roots(np.zeros(at_zero, complex), (-math.inf, math.inf, -up_to, up_to), "constant")
+        return replace(_on_axis(np.empty(0), at_zero, up_to), proof="constant")
     base = replace(wanted.base, gauge=False)
     order = order_at_zero(k, base, x)
     at_zero = max(0, order + wanted.power - k.at_rest)
@@ -105,8 +105,9 @@ def _starts_by_sampling(size_at: Callable[[Complex], Real], up_to: float) -> Com
     starts = []
     for direction in (1j, 1.0, -1.0):
         size = size_at(direction * line)
-        dips = np.nonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:]))[0] + 1
-        starts.append(direction * line[dips])
+        inner = size[1:-1]
+        is_dip = (inner < size[:-2]) & (inner < size[2:])
+        starts.append(direction * line[1:-1][is_dip])
     found = np.concatenate(starts)
     return np.r_[found, found.conj(), -found, -found.conj()]
 
@@ -236,7 +237,7 @@ class TransferFunction:
     def __call__(self, s: ArrayLike) -> Any:
         """Return G(s) at a complex scalar or array."""
         points = _finite(s)
-        return self._shaped(self._values(points.ravel()).reshape(len(self.outputs), *points.shape))
+        return self._as_single(self._values(points.ravel()).reshape(len(self.outputs), *points.shape))
 
     def by_methods(self, s: ArrayLike) -> ByMethod:
         """Return G(s) at an array of s by every method that has it (`tfarm.exact.values`), with their differences."""
@@ -254,7 +255,7 @@ class TransferFunction:
         self.must_be_of_the_hub("a derivative")
         points = _finite(s)
         flat = differentiate_outputs(self.system, self.rows, points.ravel(), self.share)
-        return self._shaped(flat.reshape(len(self.outputs), *points.shape))
+        return self._as_single(flat.reshape(len(self.outputs), *points.shape))
 
     def digits(self, s: complex, digits: int) -> Any:
         """Return G(s) as pairs of decimal strings (re, im), each with that many digits certified in ball arithmetic.
@@ -291,7 +292,7 @@ class TransferFunction:
         blocks = np.array_split(s, 1 + (s.size >> 13))
         return np.hstack([evaluate_outputs(self.system, self.rows, each, self.share) for each in blocks])
 
-    def _shaped(self, values: NDArray[Any]) -> Any:
+    def _as_single(self, values: NDArray[Any]) -> Any:
         """Return values (outputs, ...) without the first axis for a single output, a scalar as a Python number."""
         if self.is_single:
             values = values[0]
@@ -308,12 +309,12 @@ class TransferFunction:
     @property
     def rigid_body(self) -> Any:
         """The coefficient of 1/s^2 at s = 0, of the rigid body."""
-        return self._shaped(self.expansion[:, 0])
+        return self._as_single(self.expansion[:, 0])
 
     @property
     def static(self) -> Any:
         """The constant term of the expansion at s = 0: the static gain where the output is finite there."""
-        return self._shaped(self.expansion[:, 2])
+        return self._as_single(self.expansion[:, 2])
 
     def poles(self, *, up_to: float) -> Roots:
         """Return the poles with |Im s| <= up_to [rad/s], complete in the box of the record (see `Roots`).

@@ -103,7 +103,7 @@ class DampedModes:
         """
         k = self.undamped.system
         discs = []
-        for pair in self._listed:
+        for pair in self._every_pair:
             wanted = pair[:1] if pair[0].imag > 0 else pair[np.isfinite(pair)]
             discs.append(tuple(enclose_zero(k, zero, digits) for zero in wanted.tolist()))
             for zero, disc in zip(wanted.tolist(), discs[-1], strict=True):
@@ -119,7 +119,7 @@ class DampedModes:
         if not disjoint(list(chain.from_iterable(discs))):
             raise CertificationError("the discs of two eigenvalues touch: more digits are needed")
         proven = proven_count(k, self.box)
-        listed = int(self.box.holds(self._listed.ravel()).sum()) + k.at_rest
+        listed = int(self.box.holds(self._every_pair.ravel()).sum()) + k.at_rest
         if not listed == self.count == proven:
             raise CertificationError(
                 f"the box has {proven} eigenvalues, but the list {listed} and the record {self.count}"
@@ -139,7 +139,7 @@ class DampedModes:
         return np.stack([zeros, np.where(zeros.imag > 0, zeros.conj(), np.nan)], axis=-1)
 
     @property
-    def _listed(self) -> Complex:
+    def _every_pair(self) -> Complex:
         """Every eigenvalue of the record other than 0, (n, 2): of the flexible modes, single ones, unassigned ones.
 
         Rows with one eigenvalue or none have NaN.

@@ -94,13 +94,13 @@ class AxisSweep(Sweep):
 
     def _inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
         if isinstance(element, Segment):
-            return self._joined(element, p)
+            return self._across_segment(element, p)
         p = super()._inside(element, p)
         if isinstance(element, Spring):
             self._step(p[0], 1)
         return p
 
-    def _joined(self, element: Any, p: SolutionPlane) -> SolutionPlane:
+    def _across_segment(self, element: Any, p: SolutionPlane) -> SolutionPlane:
         a, b, g, *_ = element
         own = real_waves(a, b, g, self.S)
         l = element.length

@@ -260,7 +260,7 @@ def _rows(
     sensitivity = found.sensitivity
     enclosures = _discs_by_mode(damped, discs)
     for row in range(len(found)):
-        first, second, ratio = (None, None, None) if damped is None else _damped(damped, row)
+        first, second, ratio = (None, None, None) if damped is None else _damped_numbers(damped, row)
         yield ListedMode(
             index=int(found.index[row]),
             natural_frequency=omega[row],
@@ -280,7 +280,7 @@ def _rows(
         )
 
 
-def _damped(damped: DampedModes, row: int) -> tuple[complex | None, float | None, float | None]:
+def _damped_numbers(damped: DampedModes, row: int) -> tuple[complex | None, float | None, float | None]:
     """Return eigenvalue, second real eigenvalue and damping ratio of a mode, or None."""
     if row >= len(damped.index) or not damped.is_assigned[row]:
         return None, None, None

@@ -252,6 +252,4 @@ def _holds_one(k: System, law: Feedback | None, m: Ball, r: Ball) -> bool:
 def disjoint(discs: Sequence[Disc]) -> bool:
     """Whether no two discs touch."""
     parts = [(Fraction(d.re), Fraction(d.im), Fraction(d.radius)) for d in discs]
-    return all(
-        (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 > (a[2] + b[2]) ** 2 for a, b in combinations(parts, 2)
-    )
+    return all((x - u) ** 2 + (y - v) ** 2 > (r + q) ** 2 for (x, y, r), (u, v, q) in combinations(parts, 2))

@@ -144,11 +144,11 @@ class Shapes:
 
     def masses(self) -> Real:
         """Return the modal masses."""
-        return np.sum([weight @ motion**2 for weight, motion in self._moving()], axis=0)
+        return np.sum([weight @ motion**2 for weight, motion in self._inertias()], axis=0)
 
     def mass_matrix(self) -> Real:
         """Return modal masses (diagonal) and products of different modes, in EI/L: the identity to rounding."""
-        return np.asarray(sum((motion.T * weight) @ motion for weight, motion in self._moving()))
+        return np.asarray(sum((motion.T * weight) @ motion for weight, motion in self._inertias()))
 
     def states(self, places: tuple[Place, ...]) -> tuple[Real, Real]:
         """Return W, Psi, M, Q (fields, modes, places) and the hub angle (modes,)."""
@@ -230,7 +230,7 @@ class Shapes:
             result[:, modes] += _of_segment(self._segments[number], omega, states, x[modes])
         return result
 
-    def _moving(self) -> list[tuple[Real, Real]]:
+    def _inertias(self) -> list[tuple[Real, Real]]:
         """Return inertias (n,) and their motions (n, modes): along the segments, of bodies, payload and hub."""
         system = self.system
         parts = []
