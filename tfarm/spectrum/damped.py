@@ -380,7 +380,7 @@ def damped_starts(arm: Arm, omega: Real) -> Complex:
         # below the shear cut-off the second wave does not travel
         k2 = k2[k2 > 0]
         c0 = EI / rhoI * kGA / rhoA * k2**2
-        c1 = C * c0
+        c1 = EI * C / rhoI * kGA / rhoA * k2**2
         c2 = kGA / rhoA * k2 + kGA / rhoI + EI / rhoI * k2
         c3 = EI * C / rhoI * k2
         unit = c0**0.25
