@@ -40,7 +40,7 @@ from tfarm.response.frequency import resonant_band
 from tfarm.schema import Percent, Quantity, quantities
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.frequencies import list_frequencies
-from tfarm.spectrum.shapes import PARAMETERS
+from tfarm.spectrum.sensitivities import PARAMETERS
 from tfarm.studies.space import Subject, Subjects
 from tfarm.tuner.tuning import tune_by_default
 
