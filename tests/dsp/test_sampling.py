@@ -13,7 +13,8 @@ from tests.strategies import arm_of
 from tfarm.arm import FED_BACK, HubFeedback
 from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain, Sampling, pulse_transfer
-from tfarm.dsp.plant import PulseTransfer, sensed_plant
+from tfarm.dsp.pulse import PulseTransfer
+from tfarm.dsp.sensed import sensed_plant
 from tfarm.loop.sampled import sampled_loop
 
 T = 0.01

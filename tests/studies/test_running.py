@@ -18,9 +18,9 @@ from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.files import locked_folder
 from tfarm.studies import running
+from tfarm.studies.declaration import load_study
 from tfarm.studies.running import CHUNKS_A_WORKER, LEAST_SECONDS, MOST_SECONDS, rows_a_chunk
 from tfarm.studies.space import extra
-from tfarm.studies.study import load_study
 
 LAB = tfarm.load("sasaki2012-lab")
 STUDY = partial(tfarm.study, LAB, kills.OVER, ("modes",), None, Chain())

@@ -25,7 +25,8 @@ from tfarm.report.writing import write_study
 from tfarm.response.transfer import transfer
 from tfarm.schema import json_value, text, to_dict
 from tfarm.schema.terminal import show
-from tfarm.studies.study import SobolIndex, WorstArm
+from tfarm.studies.sobol import SobolIndex
+from tfarm.studies.worst import WorstArm
 
 COMMAND = ("study", "sasaki2012-lab", "--over", "payload.mass=uniform:0,0.2", "--over", "hub.inertia=uniform:0.05,0.2")
 WORST = WorstArm(

@@ -34,10 +34,11 @@ from tfarm.assessment.card import loop_names
 from tfarm.case import Case
 from tfarm.digits import general
 from tfarm.dsp import Chain, traces
-from tfarm.dsp.plant import sensed_plant
-from tfarm.dsp.results import ENOUGH_CHANGE, simulate_modes
+from tfarm.dsp.results import simulate_modes
 from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, describe_scenario, rest_scenario, scenario
-from tfarm.dsp.simulate import MOST_BETWEEN, SETTLING_BAND, final_value, first_mode, settling_time
+from tfarm.dsp.sensed import sensed_plant
+from tfarm.dsp.simulate import MOST_BETWEEN, first_mode
+from tfarm.dsp.simulation import SETTLING_BAND, final_value, settling_time
 from tfarm.dsp.stages import admit_case, not_covered
 from tfarm.errors import must_be_known, require
 from tfarm.loop.continuous import ContinuousLoop
@@ -249,10 +250,9 @@ class _LoopRecord:
         run, used = simulate_modes(case, task, between=between, outputs=names)
         signals = {name: traces.continuous(run, name)[1][: self.t.size] for name in names}
         signals[TORQUE] = traces.held_at(run, run.torque, self.t[: signals[MOMENT].size])
-        is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
         word = UNSTABLE if run.stopped else sampled_verdict(case).word
         curves = {name: (self.t[: y.size], y, 0 * y, None) for name, y in signals.items()}
-        return self._loop(word, is_converged, f"{used.modes} modes", curves)
+        return self._loop(word, used.is_converged, f"{used.modes} modes", curves)
 
     def _loop(
         self, stability: str, is_converged: bool, count: str, curves: Mapping[str, SignalCurve]

@@ -1,9 +1,10 @@
 """The sampled chain in time: hold, delay, converters, discretisation and simulation at 10 ms or any other period."""
 
 from tfarm.arm.chain import Actuator, Chain, Converters, Sampling, Slew, load_chain
-from tfarm.dsp.plant import PulseTransfer, pulse_transfer
+from tfarm.dsp.pulse import PulseTransfer, pulse_transfer
 from tfarm.dsp.scenarios import Scenario, scenario
-from tfarm.dsp.simulate import Measurement, Simulation, Simulator
+from tfarm.dsp.simulate import Measurement, Simulator
+from tfarm.dsp.simulation import Simulation
 from tfarm.moved import moved, moved_module
 
 __all__ = [

@@ -21,15 +21,13 @@ from tfarm.case import Case, OfCase
 from tfarm.dsp.discretise import RULE, rule_in_words
 from tfarm.dsp.plant import MODES_USED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, describe_scenario, scenario
-from tfarm.dsp.simulate import Simulation, Simulator, Trace
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.simulation import Simulation, Trace
 from tfarm.dsp.traces import resolve_simulations
 from tfarm.errors import ConvergenceError
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Column, Quantity, Table
-
-# of each signal's largest value: the digits of a table of a simulation
-ENOUGH_CHANGE = 1e-4
 
 
 class Enough(NamedTuple):
@@ -48,6 +46,11 @@ class Enough(NamedTuple):
             help="largest relative change of a signal when the number of modes was doubled",
         ),
     ]
+
+    @property
+    def is_converged(self) -> bool:
+        """Whether the change is within 1e-4, the digits of a table of a simulation."""
+        return self.change is not None and self.change <= 1e-4
 
 
 def enough_modes(simulate: Callable[[int], Simulation], count: int | None = None) -> Enough:
@@ -70,7 +73,7 @@ def enough_modes(simulate: Callable[[int], Simulation], count: int | None = None
         off = change(before.at_samples, now.at_samples)
         before = now
         found = Enough(count, off)
-        if off <= ENOUGH_CHANGE:
+        if found.is_converged:
             break
     return found
 

@@ -23,7 +23,6 @@ TRIAL_COST = (1.0, 2.6)
 TRIAL_SLEWS = 3.0
 # s, of a trial or a simulation by default: three times the paper's slew
 TRIAL_DURATION = 3.0
-SCENARIOS = ("slew", "step", "decay", "impulse", "pulse")
 
 
 @frozen
@@ -162,7 +161,7 @@ def describe_scenario(task: Scenario, arm: Arm, chain: Chain) -> str:
 
 def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
     """Return the scenario of that name with its usual size.  Raises ParameterError for an unknown one."""
-    must_be_known("scenario", name, SCENARIOS)
+    must_be_known("scenario", name, ("slew", "step", "decay", "impulse", "pulse"))
     if name == "slew":
         return slew_scenario(arm, chain, duration)
     return rest_scenario(name, arm, chain, duration)

@@ -22,7 +22,8 @@ from tfarm.arrays import Complex, Real
 from tfarm.case import Case
 from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.scenarios import Scenario
-from tfarm.dsp.simulate import Simulation, Simulator
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.simulation import Simulation
 from tfarm.errors import require
 from tfarm.records import frozen
 from tfarm.schema import Column
@@ -32,18 +33,10 @@ from tfarm.spectrum import modes
 POINTS_A_PERIOD = 20
 # of the height of a curve: a pixel of a picture
 VISIBLE = 1 / 300
-# records between two samples at least
-LEAST_BETWEEN = 3
 # points of a line: at 20 a period still three pixels a period
 MOST_LINE = 6000
-# of the fastest mode that each piece of a band holds at least
-PERIODS = 2
-# times the slew: length of a record
-RECORD_LENGTH = 3.0
 # frames a second
 RATE = 20
-# of a film
-MOST_FRAMES = 240
 
 
 def records_between(arm: Arm, run: Simulation) -> int:
@@ -86,9 +79,10 @@ def resolve_simulations(
 ) -> list[Simulation]:
     """Return the simulations of one picture, with enough records between their samples for its fastest visible mode."""
     needed = max(records_between(arm, run(simulator)) for run in runs)
-    # some 30 MB of records
-    most = max(LEAST_BETWEEN, 400_000 // simulator.scenario.t.size)
-    finer = simulator.finer(min(max(LEAST_BETWEEN, needed), most))
+    # records between two samples; the most of a long scenario are some 30 MB
+    least = 3
+    most = max(least, 400_000 // simulator.scenario.t.size)
+    finer = simulator.finer(min(max(least, needed), most))
     return [run(finer) for run in runs]
 
 
@@ -133,8 +127,8 @@ def curve(t: Real, y: Real) -> TimeCurve:
     """A line where it is short enough for a page, else a band."""
     if t.size <= MOST_LINE:
         return TimeCurve(t, y, y, False)
-    # at most 1500 pieces
-    step = max(PERIODS * POINTS_A_PERIOD, math.ceil(t.size / 1500))
+    # at most 1500 pieces, each of at least two periods of the fastest mode
+    step = max(2 * POINTS_A_PERIOD, math.ceil(t.size / 1500))
     starts = np.arange(0, t.size, step)
     return TimeCurve(t[starts], np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts), True)
 
@@ -182,8 +176,11 @@ class Motion(NamedTuple):
         return f"t = {self.t[frame]:.2f} s,  u = {u:.3g} {self.arm.input_unit}"
 
 
-def motion_of(arm: Arm, run: Simulation, until: float = math.inf, most: int = MOST_FRAMES) -> Motion:
-    """Return the motion of a run up to a time [s]: its torques are applied to the arm again, with more outputs."""
+def motion_of(arm: Arm, run: Simulation, until: float = math.inf, most: int = 240) -> Motion:
+    """Return the motion of a run up to a time [s]: its torques are applied to the arm again, with more outputs.
+
+    At most about `most` frames.
+    """
     require(run.t.size > 1, "run", run.t.size, "give a simulation with more than one sample")
     end = min(until, float(run.t[-1]))
     # stations along the link

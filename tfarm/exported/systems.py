@@ -29,7 +29,9 @@ from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex
 from tfarm.case import Case
 from tfarm.dsp.discretise import acting_law, with_estimate
-from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, arm_under_chain, sensed_plant
+from tfarm.dsp.plant import USUAL_MODES, arm_under_chain
+from tfarm.dsp.pulse import PulseTransfer
+from tfarm.dsp.sensed import sensed_plant
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import require
 from tfarm.exported.result import Export, ExportTask, names_of

@@ -20,7 +20,9 @@ from tfarm.arm.chain import Chain
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing import Steps
 from tfarm.dsp.discretise import LawInZ, lowest_power, root_product
-from tfarm.dsp.plant import Plant, PulseTransfer, SensedPlant, is_analog
+from tfarm.dsp.plant import Plant, is_analog
+from tfarm.dsp.pulse import PulseTransfer
+from tfarm.dsp.sensed import SensedPlant
 from tfarm.records import frozen
 
 # rad, of a pole: closer to it angles are not distinct

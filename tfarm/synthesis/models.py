@@ -24,8 +24,9 @@ from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, Scenario, scenario
-from tfarm.dsp.plant import PulseTransfer, sensed_plant
+from tfarm.dsp.pulse import PulseTransfer
 from tfarm.dsp.scenarios import TRIAL_SLEWS, trial_weights
+from tfarm.dsp.sensed import sensed_plant
 from tfarm.loop.continuous import frequency_above_mode, grid
 from tfarm.records import frozen
 from tfarm.reduced.modal import ALGEBRAIC, sensed_model

@@ -45,7 +45,8 @@ from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
 from tfarm.arrays import Real
-from tfarm.dsp.plant import first_distinct, held_amplitude
+from tfarm.dsp.plant import first_distinct
+from tfarm.dsp.pulse import held_amplitude
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.exact.rationals import exact_matrix, falls, is_positive_definite

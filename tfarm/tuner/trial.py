@@ -37,7 +37,7 @@ from tfarm.arrays import Real
 from tfarm.case import Case
 from tfarm.dsp import Chain, Measurement, Scenario, Simulation, Simulator, scenario
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
-from tfarm.dsp.simulate import FOLDED_UP
+from tfarm.dsp.simulate import largest_moment
 from tfarm.dsp.stages import admit
 from tfarm.errors import must_be_known, name_file, require
 from tfarm.files import write_file
@@ -63,9 +63,6 @@ class Cost:
     def __post_init__(self) -> None:
         check_annotated(self, "")
         require(self.a or self.b, "a", self.a, "a and b are both zero: one of them has to be positive")
-
-
-DEFAULT_COST = Cost()
 
 
 @frozen
@@ -138,10 +135,11 @@ class Trial:
         """The cost's weights, the period, the largest moment, and when and how x follows a torque."""
         model = self.model
         sampling = self.loop.chain.sampling
-        bound = float(FOLDED_UP * self.arm.bending_scale)
         delay = sampling.whole_delay
         reply = float(model.moment @ np.linalg.matrix_power(model.A, delay) @ model.B)
-        return kernel.Numbers(self.cost.a, self.cost.b, sampling.period, bound, 1 + delay, reply)
+        return kernel.Numbers(
+            self.cost.a, self.cost.b, sampling.period, largest_moment(self.arm), 1 + delay, reply
+        )
 
     def setting(self, network: Network, guard: kernel.Limits) -> kernel.Setting:
         """Arguments of the compiled loops, without weights."""
@@ -194,7 +192,7 @@ def slew_trial(
     *,
     K1: float | None = None,
     Kp: float = 0.0,
-    cost: Cost = DEFAULT_COST,
+    cost: Cost | None = None,
     signals: MomentReading = "vibration",
     duration: float = TRIAL_DURATION,
     count: int = TRIAL_MODES,
@@ -214,7 +212,7 @@ def slew_trial(
     require(length >= rise, "duration", length, f"a trial lasts at least as long as its slew, {rise:g} s")
     must_not_be_algebraic(arm, "hub.inertia", 0.0)
     loop = sampled_loop(Case(arm, gains, chain), count=count)
-    return Trial(loop, scenario("slew", arm, chain, length), cost, signals)
+    return Trial(loop, scenario("slew", arm, chain, length), Cost() if cost is None else cost, signals)
 
 
 def usual_rate_gain(arm: Arm, Kp: float) -> float:
@@ -242,7 +240,6 @@ def residual_rms(record: Record, task: Scenario) -> float | None:
     return task.residual_rms(record.moment)
 
 
-FORMAT: Literal["tfarm tuner 1"] = "tfarm tuner 1"
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 

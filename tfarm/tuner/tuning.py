@@ -17,7 +17,7 @@ from tfarm.case import Case
 from tfarm.dsp import Chain, scenario
 from tfarm.dsp.results import Run, simulate_modes
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, describe_scenario, torque_unit
-from tfarm.dsp.simulate import RESIDUAL
+from tfarm.dsp.simulation import RESIDUAL
 from tfarm.errors import require
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -27,7 +27,6 @@ from tfarm.tuner.guard import Guard, GuardKind, find_guard
 from tfarm.tuner.kernel import PAPER_HIDDEN, PAPER_INPUTS, Network, initial_network
 from tfarm.tuner.training import Learning, LearningCurves, Training, train
 from tfarm.tuner.trial import (
-    FORMAT,
     TRIAL_MODES,
     Cost,
     Record,
@@ -127,7 +126,7 @@ class Tuning:
         plan = self.plan
         network = self.training.network
         return SavedTuner(
-            format=FORMAT,
+            format="tfarm tuner 1",
             arm=self.trial.arm.name,
             period=self.trial.task.period,
             K1=plan.K1,
