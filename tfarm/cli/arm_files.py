@@ -11,7 +11,10 @@ import typer
 
 import tfarm
 from tfarm.arm.parts import SHAPES
-from tfarm.cli.app import SAMPLING, Png, TheoryName, add_command, advance, emit_record, preset_names, refuse
+from tfarm.cli.app import add_command
+from tfarm.cli.options import SAMPLING, Png, TheoryName, preset_names, refuse
+from tfarm.cli.output import emit_record
+from tfarm.cli.progress import advance
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
 from tfarm.files import write_file
 from tfarm.schema import Quantity
@@ -19,7 +22,7 @@ from tfarm.schema import Quantity
 Size = Annotated[float | None, typer.Option(rich_help_panel="Section")]
 
 
-def entered(option: str, value: Any, text: str, kind: type = float, usual: Any = None) -> Any:
+def value_or_prompt(option: str, value: Any, text: str, kind: type = float, usual: Any = None) -> Any:
     """Return the value of an option, where it is None the answer to a question on a terminal.
 
     Raises ParameterError where standard input is no terminal.
@@ -43,9 +46,9 @@ def link_table(*, material: str | None = None, length: float | None = None) -> d
     """
     from tfarm.arm.materials import materials
 
-    chosen = entered("--material", material, f"material ({', '.join(materials())})", str, "steel")
+    chosen = value_or_prompt("--material", material, f"material ({', '.join(materials())})", str, "steel")
     must_be_known("--material", chosen, materials())
-    return {"length": entered("--length", length, "length of the link [m]"), "material": chosen}
+    return {"length": value_or_prompt("--length", length, "length of the link [m]"), "material": chosen}
 
 
 def section_table(
@@ -80,10 +83,12 @@ def section_table(
     last = (given or ["width"])[-1]
     shapes = [shape for shape, of in SHAPES.items() if set(given) <= set(of.dimensions)]
     require(shapes, options[last], sizes[last], f"give the sizes of one section: {sections}")
-    shape = shapes[0] if given else entered(options[last], None, f"section: {sections}", str, "rectangle")
+    shape = (
+        shapes[0] if given else value_or_prompt(options[last], None, f"section: {sections}", str, "rectangle")
+    )
     must_be_known("section", shape, SHAPES)
     return {"shape": shape} | {
-        name: entered(
+        name: value_or_prompt(
             options[name], sizes[name], "{0.label} ({0.help}) [m]".format(file_key(f"link.section.{name}"))
         )
         for name in SHAPES[shape].dimensions
@@ -186,7 +191,9 @@ def new(
         "name": file.stem,
         "link": ({} if damping is None else {"damping": damping}) | link() | {"section": section()},
         "hub": {
-            "inertia": entered("--hub-inertia", hub_inertia, "inertia of the hub about the axis [kg m^2]")
+            "inertia": value_or_prompt(
+                "--hub-inertia", hub_inertia, "inertia of the hub about the axis [kg m^2]"
+            )
         },
         "payload": {"mass": payload_mass, "inertia": payload_inertia},
         **({} if period is None else {"sampling": {"period": period}}),

@@ -9,27 +9,24 @@ import numpy as np
 import typer
 
 import tfarm
-from tfarm.cli.app import (
+from tfarm.cli.app import add_command
+from tfarm.cli.options import (
     ArmName,
     File,
     InputName,
     Png,
     TheoryName,
-    add_command,
-    advance,
-    emit,
-    emit_loop,
-    emit_record,
+    chain_of_options,
     interval,
     load_arm,
-    load_chain,
     load_loop,
-    named,
+    name_and,
     numbers,
     outputs_on,
-    print_line,
     refuse,
 )
+from tfarm.cli.output import emit, emit_loop, emit_record
+from tfarm.cli.progress import advance, print_line
 from tfarm.errors import require
 
 command = partial(add_command, "Arm")
@@ -40,7 +37,7 @@ RecordName = Annotated[
         metavar="RECORD", exists=True, help="CSV or .mat file: t [s] and signals", show_default=False
     ),
 ]
-pair = named(numbers("KEY=NUMBER,NUMBER", 2))
+pair = name_and(numbers("KEY=NUMBER,NUMBER", 2))
 OWN_TABLE = "--compare prints a table of its own: ask for one of them"
 
 
@@ -197,7 +194,7 @@ def bode(
     loop: bool = False,
     along: Any = outputs_on,
     under: Any = load_loop,
-    chain: Any = load_chain,
+    chain: Any = chain_of_options,
     show: Any = emit,
 ) -> None:
     """Bode plot of the exact response, or of the loop function.
@@ -277,7 +274,7 @@ def fit(
     data: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
     free: Annotated[str, typer.Option(metavar="KEY,KEY")] = "",
     start: Annotated[
-        list[Any] | None, typer.Option(metavar="KEY=VALUE", parser=named(numbers("KEY=NUMBER", 1)))
+        list[Any] | None, typer.Option(metavar="KEY=VALUE", parser=name_and(numbers("KEY=NUMBER", 1)))
     ] = None,
     bounds: Annotated[list[Any] | None, typer.Option(metavar="KEY=LO,HI", parser=pair)] = None,
     prior: Annotated[list[Any] | None, typer.Option(metavar="KEY=MEAN,STD", parser=pair)] = None,

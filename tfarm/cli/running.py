@@ -14,7 +14,8 @@ import typer
 from typer.exceptions import TyperException
 
 from tfarm.cli import arm_files, commands, control, designing, pages  # noqa: F401  each adds its commands
-from tfarm.cli.app import app, discard, print_line, progress
+from tfarm.cli.app import app
+from tfarm.cli.progress import discard, print_line, progress
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, require
 from tfarm.files import STANDARD_OUTPUT
 
