@@ -1,4 +1,9 @@
-"""Findings over the arms of a study: stable shares, distributions with their drivers, failures, and response bands."""
+"""Findings over the arms of a study: stable shares, distributions with their drivers, failures, and response bands.
+
+With k of n independent draws stable, at least the share p is stable with the confidence 1 - a, where k or more of n
+have the probability a at p: the one-sided interval of Clopper and Pearson (Biometrika 26, 1934).  An arm without a
+result counts as not stable.
+"""
 
 import math
 import re
@@ -21,8 +26,6 @@ from tfarm.studies.quantities import LOOPS, STABLE, loop_of, quantity_of
 from tfarm.studies.space import Subjects
 
 CONFIDENCE = 0.95
-
-
 QUANTILES = {"least": 0.0, "low": 0.05, "median": 0.5, "high": 0.95, "largest": 1.0}
 
 
@@ -44,11 +47,12 @@ class StableShare(NamedTuple):
         self,
     ) -> Annotated[str, Quantity("finding", help="stable arms, with their confidence in per cent")]:
         """Stable arms with certainty and confidence."""
-        text = f"{self.certainty} stable on {self.stable:,} of {self.stable + self.other + self.open:,} arms".strip()
-        others = [f"{self.other:,} not stable"] * bool(self.other) + [f"{self.open:,} not determined"] * bool(
-            self.open
-        )
-        text += f" ({', '.join(others)})" * bool(others)
+        count = self.stable + self.other + self.open
+        text = f"{self.certainty} stable on {self.stable:,} of {count:,} arms".strip()
+        numbers = {"not stable": self.other, "not determined": self.open}
+        others = [f"{number:,} {word}" for word, number in numbers.items() if number]
+        if others:
+            text += f" ({', '.join(others)})"
         if self.at_least is None:
             return text
         # never more than was shown
@@ -93,7 +97,9 @@ def shares_of(
 ) -> tuple[StableShare, ...]:
     """Return the stable shares of the loops whose stability was computed."""
     found = []
-    for loop in [each for each in LOOPS if f"{each}.stability" in names]:
+    for loop in LOOPS:
+        if f"{loop}.stability" not in names:
+            continue
         words = table[f"{loop}.stability"].tolist()
         stable = words.count(STABLE)
         undetermined = words.count("")
@@ -119,36 +125,39 @@ def shares_of(
 def spreads_of(table: Mapping[str, Any], names: Sequence[str], keys: Sequence[str]) -> tuple[Spread, ...]:
     """Return the distribution of each quantity that has finite values."""
     found = []
-    for name, of in ((name, quantity_of(name)) for name in names):
-        if of.is_number and of.label and (is_known := np.isfinite(table[name])).any():
-            values = table[name][is_known]
-            driver, correlation = _driver({key: table[key][is_known] for key in keys}, values)
-            ends = dict(zip(QUANTILES, np.quantile(values, list(QUANTILES.values())).tolist(), strict=True))
-            label = ", ".join(filter(None, (loop_of(name), of.label)))
-            found.append(
-                Spread(
-                    name=name,
-                    label=label,
-                    unit=of.unit,
-                    arms=values.size,
-                    driver=driver,
-                    correlation=correlation,
-                    **ends,
-                )
-            )
+    for name in names:
+        of = quantity_of(name)
+        if not (of.is_number and of.label):
+            continue
+        is_known = np.isfinite(table[name])
+        if not is_known.any():
+            continue
+        values = table[name][is_known]
+        driver, correlation = _driver({key: table[key][is_known] for key in keys}, values)
+        ends = np.quantile(values, list(QUANTILES.values())).tolist()
+        spread = Spread(
+            name=name,
+            label=", ".join(filter(None, (loop_of(name), of.label))),
+            unit=of.unit,
+            arms=values.size,
+            driver=driver,
+            correlation=correlation,
+            **dict(zip(QUANTILES, ends, strict=True)),
+        )
+        found.append(spread)
     return tuple(found)
 
 
 def _driver(inputs: Mapping[str, Real], values: Real) -> tuple[str | None, float | None]:
     """Return the varied number of the largest significant rank correlation, and that."""
-    known = {
-        key: scipy.stats.spearmanr(column, values)
-        for key, column in inputs.items()
-        if len(values) >= 10 and np.ptp(column) > 0 and np.ptp(values) > 0
-    }
-    # Bonferroni: of several numbers one is often near it by chance
-    level = 0.05 / max(1, len(inputs))
-    found = {key: float(of.statistic) for key, of in known.items() if of.pvalue < level}
+    found = {}
+    is_enough = len(values) >= 10 and np.ptp(values) > 0
+    for key, column in inputs.items():
+        if is_enough and np.ptp(column) > 0:
+            of = scipy.stats.spearmanr(column, values)
+            # Bonferroni: of several numbers one is often near it by chance
+            if of.pvalue < 0.05 / len(inputs):
+                found[key] = float(of.statistic)
     return max(found.items(), key=lambda each: abs(each[1]), default=(None, None))
 
 

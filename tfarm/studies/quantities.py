@@ -1,11 +1,6 @@
-"""Quantities that a study asks of each arm, and the findings over all arms.
+"""Quantities that a study asks of each arm: its columns, and the functions that have their values.
 
-Quantities are entries of the records of tfarm, by their dotted names in JSON.  Findings are the share of stable arms
-with its confidence, the spread of each quantity and its driver, and the reasons of missing results.
-
-With k of n independent draws stable, at least the share p is stable with the confidence 1 - a, where k or more of n
-have the probability a at p: the one-sided interval of Clopper and Pearson (Biometrika 26, 1934).  An arm without a
-result counts as not stable.
+Quantities are entries of the records of tfarm, by their dotted names in JSON.
 """
 
 import math
@@ -14,7 +9,8 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
+from itertools import chain
 from typing import Any, get_args, get_origin, get_type_hints
 
 # whose statistics take half a second to load
@@ -37,21 +33,12 @@ from tfarm.tuner.tuning import tune_by_default
 
 # column of the reason of a missing result
 FAILED = "failed"
-# modes and poles of a row
-LISTED = 5
-NO_PARENT = Quantity()
 LOOPS = ("continuous", "sampled")
 # the result card of both loops
 CARD = "card"
 FREQUENCY = "modes.natural_frequency_rad_s"
-RATIO = "damped_modes.damping_ratio"
-SENSITIVITY = "sensitivity"
 INTERVAL = "interval"
 STABILITY = "interval.verdict"
-TRIAL_COST = "tuner.trial_cost"
-UNSTABLE = "poles.unstable"
-REAL = "poles.re_1_s"
-IMAGINARY = "poles.im_rad_s"
 
 
 STABLE = "stable"
@@ -90,12 +77,13 @@ def _most(names: Set[str]) -> int:
 
 
 def entries_of(
-    kind: Any, value: Any, under: str, parent: Quantity = NO_PARENT
+    kind: Any, value: Any, under: str, parent: Quantity | None = None
 ) -> Iterator[tuple[str, Quantity, Any]]:
     """Yield dotted name, quantity and value of each entry of a record of that class; no value where that is None.
 
     The first entry without a label (the value of a graded margin) has the name and the quantity of its parent.
     """
+    parent = Quantity() if parent is None else parent
     for name, of in quantities(kind).items():
         kinds = _kinds(kind)[name]
         own = None if value is None else getattr(value, name)
@@ -108,23 +96,19 @@ def entries_of(
         if inner is not None:
             yield from entries_of(inner, own, place, column)
         else:
-            is_text = bool({str, tuple} & {*kinds})
-            yield (
-                place,
-                replace(column, is_number=not is_text),
-                "; ".join(own) if isinstance(own, tuple) else own,
-            )
+            is_text = str in kinds or tuple in kinds
+            shown = "; ".join(own) if isinstance(own, tuple) else own
+            yield place, replace(column, is_number=not is_text), shown
 
 
 @cache
 def _kinds(kind: Any) -> dict[str, tuple[Any, ...]]:
     """Return the classes of which each field of a record may be."""
-    return {
-        name: tuple(
-            each for part in (hint, *get_args(hint)) if isinstance(each := get_origin(part) or part, type)
-        )
-        for name, hint in get_type_hints(kind).items()
-    }
+    found = {}
+    for name, hint in get_type_hints(kind).items():
+        parts = (get_origin(part) or part for part in (hint, *get_args(hint)))
+        found[name] = tuple(each for each in parts if isinstance(each, type))
+    return found
 
 
 def _card_of(loop: str) -> ColumnSource:
@@ -142,18 +126,28 @@ def _card_of(loop: str) -> ColumnSource:
     return {name: column for name, column, _ in entries_of(LoopCard, None, loop)}, values
 
 
-def _step_of(one: Subject, _: Set[str]) -> dict[str, Any]:
-    found = step(one.case.arm, one.case.law, one.case.chain, "slew")
-    return {
-        name: value
-        for loop in LOOPS
-        for name, _, value in entries_of(LoopResponse, getattr(found, loop), f"step.{loop}")
-    }
+def _step_of_both() -> ColumnSource:
+    """Return the entries of the slew of both loops."""
+
+    def entries(of: Any) -> Iterator[tuple[str, Quantity, Any]]:
+        for loop in LOOPS:
+            yield from entries_of(LoopResponse, getattr(of, loop, None), f"step.{loop}")
+
+    def values(one: Subject, _: Set[str]) -> dict[str, Any]:
+        found = step(one.case.arm, one.case.law, one.case.chain, "slew")
+        return {name: value for name, _, value in entries(found)}
+
+    return {name: column for name, column, _ in entries(None)}, values
 
 
-def _modes_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
-    count = _most(names)
-    return _numbered(FREQUENCY, modes(one.case.arm, count).natural_frequency[-count:])
+def _natural_frequencies() -> ColumnSource:
+    """Return the natural frequencies of the undamped arm."""
+
+    def values(one: Subject, names: Set[str]) -> dict[str, float | None]:
+        count = _most(names)
+        return _number_values(FREQUENCY, modes(one.case.arm, count).natural_frequency[-count:])
+
+    return _columns(FREQUENCY, "natural frequency, mode", "rad/s", "of the undamped arm"), values
 
 
 def prepare(subjects: Sequence[Subject], names: Sequence[str]) -> None:
@@ -169,138 +163,131 @@ def prepare(subjects: Sequence[Subject], names: Sequence[str]) -> None:
         list_frequencies(systems, rigid + 1, rigid + _most(numbers))
 
 
-def _sensitivities_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
-    count = _most(names)
-    return {
-        name: value
-        for parameter, values in modes(one.case.arm, count).sensitivity.items()
-        for name, value in _numbered(f"{SENSITIVITY}.{parameter}", values[-count:] + 0.0).items()
-    }
+def _sensitivities() -> ColumnSource:
+    """Return the sensitivities of the natural frequencies to each parameter of the arm."""
+    columns: dict[str, Quantity] = {}
+    for parameter in PARAMETERS:
+        label = f"sensitivity to {parameter}, mode"
+        meaning = "d ln(natural frequency)/d ln(number)"
+        columns |= _columns(f"sensitivity.{parameter}", label, "%/%", meaning)
+
+    def values(one: Subject, names: Set[str]) -> dict[str, float | None]:
+        count = _most(names)
+        found: dict[str, float | None] = {}
+        for parameter, of in modes(one.case.arm, count).sensitivity.items():
+            found |= _number_values(f"sensitivity.{parameter}", of[-count:] + 0.0)
+        return found
+
+    return columns, values
+
+
+def _intervals() -> ColumnSource:
+    """Return the stability of the continuous-time loop, and the intervals of its gains."""
+    columns = {STABILITY: Quantity("stability", help="of the continuous-time loop")}
+    for gain in PLANE:
+        for name, of in quantities(Interval).items():
+            label = f"stability interval of {gain} {of.label}"
+            columns[f"{INTERVAL}.{gain}.{name}"] = replace(of, label=label)
+    return columns, intervals_of
 
 
 def intervals_of(one: Subject, names: Set[str]) -> dict[str, Any]:
-    """Stability and intervals of gains at the hub; undecided, without intervals, where poles cannot be counted."""
+    """Return stability and intervals of gains at the hub; undecided, without any, where poles cannot be counted."""
     found: dict[str, Any] = {STABILITY: "undecided"}
     with suppress(ConvergenceError):
         verdict = stability(admit_case(SAMPLED_LOOP, one.case))
-        gains = [
-            gain
-            for gain in PLANE
-            if gain in verdict.loop.numbers and any(f".{gain}." in name for name in names)
-        ]
+        wanted = {name.split(".")[1] for name in names}
+        gains = [gain for gain in PLANE if gain in verdict.loop.numbers and gain in wanted]
         for gain, of in windows_of(verdict, gains).items():
-            found |= {
-                f"{INTERVAL}.{gain}.{name}": getattr(of.interval, name, None) for name in Interval._fields
-            }
+            for name in Interval._fields:
+                found[f"{INTERVAL}.{gain}.{name}"] = getattr(of.interval, name, None)
         found[STABILITY] = verdict.word
     return found
 
 
-def _damped_of(one: Subject, names: Set[str]) -> dict[str, float | None]:
-    found = damped_modes(modes(one.case.arm, _most(names)))
-    s = found.eigenvalues[found.index > 0, 0]
-    return _numbered(RATIO, -s.real / abs(s))
+def _damping_ratios() -> ColumnSource:
+    """Return the damping ratios of the arm without controller."""
+    ratio = "damped_modes.damping_ratio"
+
+    def values(one: Subject, names: Set[str]) -> dict[str, float | None]:
+        found = damped_modes(modes(one.case.arm, _most(names)))
+        s = found.eigenvalues[found.index > 0, 0]
+        return _number_values(ratio, -s.real / abs(s))
+
+    return _columns(ratio, "damping ratio, mode", "", "of the arm without controller"), values
 
 
-def _poles_of(one: Subject, _: Set[str]) -> dict[str, float | None]:
-    case = admit_case(SAMPLED_LOOP, one.case)
-    found = closed_loop_poles(case.arm, case.law)
-    s = found.values
-    return {UNSTABLE: float(found.unstable), **_numbered(REAL, s.real), **_numbered(IMAGINARY, s.imag)}
+def _poles() -> ColumnSource:
+    """Return the poles of the continuous-time loop, and the number of unstable ones."""
+    unstable = "poles.unstable"
+    real = "poles.re_1_s"
+    imaginary = "poles.im_rad_s"
 
+    def values(one: Subject, _: Set[str]) -> dict[str, float | None]:
+        case = admit_case(SAMPLED_LOOP, one.case)
+        found = closed_loop_poles(case.arm, case.law)
+        s = found.values
+        parts = _number_values(real, s.real) | _number_values(imaginary, s.imag)
+        return {unstable: float(found.unstable), **parts}
 
-def _numbered(name: str, values: Any) -> dict[str, float | None]:
-    """Return values under numbered names, None where there are none."""
-    return {
-        f"{name}.{n}": each if math.isfinite(each) else None
-        for n, each in enumerate(values.tolist(), start=1)
+    columns = {
+        unstable: Quantity("unstable poles", help="conjugates counted", is_number=True),
+        **_columns(real, "real part, pole", "1/s", "of the continuous-time loop, ascending in frequency"),
+        **_columns(imaginary, "imaginary part, pole", "rad/s", "of the continuous-time loop, ascending"),
     }
+    return columns, values
+
+
+def _tuning() -> ColumnSource:
+    """Return the costs of a tuning, and its end."""
+    trial_cost = "tuner.trial_cost"
+
+    def values(one: Subject, _: Set[str]) -> dict[str, Any]:
+        tuning = tune_by_default(one.case.arm, one.case.chain, None, **one.tuner)
+        training = tuning.training
+        return {
+            **_number_values(trial_cost, training.costs),
+            "tuner.cost": training.result.cost if training.stopped is None else None,
+            "tuner.cost_best_constant": tuning.best_constant.cost,
+            "tuner.trials": float(training.costs.size),
+            "tuner.is_zero": float(training.died),
+            "tuner.stopped": training.stopped and str(training.stopped),
+        }
+
+    number = partial(Quantity, is_number=True)
+    columns = {
+        "tuner.cost": number("cost of the tuned slew", help="none where training diverged"),
+        "tuner.cost_best_constant": number("cost with the best constant gain", help="same slew"),
+        "tuner.trials": number("trials", help="slews of the training"),
+        "tuner.is_zero": number("zero gain", help="1 where the moment gain went to zero, else 0"),
+        f"{trial_cost}.1": number("cost of trial 1", help="none after a divergence"),
+        "tuner.stopped": Quantity("stopped", help="trial and sample of a divergence"),
+    }
+    return columns, values
+
+
+def _number_values(name: str, values: Any) -> dict[str, float | None]:
+    """Return values under numbered names, None where there are none."""
+    known = (each if math.isfinite(each) else None for each in values.tolist())
+    return {f"{name}.{n}": each for n, each in enumerate(known, start=1)}
 
 
 def _columns(name: str, label: str, unit: str, meaning: str) -> dict[str, Quantity]:
-    """Return the numbered columns of a quantity of modes or poles."""
-    return {
-        f"{name}.{n}": Quantity(f"{label} {n}", unit, help=meaning, is_number=True)
-        for n in range(1, LISTED + 1)
-    }
+    """Return the columns of the first five of a quantity of modes or poles."""
+    return {f"{name}.{n}": Quantity(f"{label} {n}", unit, help=meaning, is_number=True) for n in range(1, 6)}
 
 
-def _tuner_of(one: Subject, _: Set[str]) -> dict[str, Any]:
-    tuning = tune_by_default(one.case.arm, one.case.chain, None, **one.tuner)
-    training = tuning.training
-    return {
-        **_numbered(TRIAL_COST, training.costs),
-        "tuner.cost": training.result.cost if training.stopped is None else None,
-        "tuner.cost_best_constant": tuning.best_constant.cost,
-        "tuner.trials": float(training.costs.size),
-        "tuner.is_zero": float(training.died),
-        "tuner.stopped": training.stopped and str(training.stopped),
-    }
-
-
-ASKED: tuple[ColumnSource, ...] = (
+SOURCES: tuple[ColumnSource, ...] = (
     *map(_card_of, LOOPS),
-    (_columns(FREQUENCY, "natural frequency, mode", "rad/s", "of the undamped arm"), _modes_of),
-    (
-        {
-            name: column
-            for parameter in PARAMETERS
-            for name, column in _columns(
-                f"{SENSITIVITY}.{parameter}",
-                f"sensitivity to {parameter}, mode",
-                "%/%",
-                "d ln(natural frequency)/d ln(number)",
-            ).items()
-        },
-        _sensitivities_of,
-    ),
-    (
-        {
-            STABILITY: Quantity("stability", help="of the continuous-time loop"),
-            **{
-                f"{INTERVAL}.{gain}.{name}": replace(of, label=f"stability interval of {gain} {of.label}")
-                for gain in PLANE
-                for name, of in quantities(Interval).items()
-            },
-        },
-        intervals_of,
-    ),
-    (_columns(RATIO, "damping ratio, mode", "", "of the arm without controller"), _damped_of),
-    (
-        {
-            UNSTABLE: Quantity("unstable poles", help="conjugates counted", is_number=True),
-            **_columns(REAL, "real part, pole", "1/s", "of the continuous-time loop, ascending in frequency"),
-            **_columns(IMAGINARY, "imaginary part, pole", "rad/s", "of the continuous-time loop, ascending"),
-        },
-        _poles_of,
-    ),
-    (
-        {
-            name: column
-            for loop in LOOPS
-            for name, column, _ in entries_of(LoopResponse, None, f"step.{loop}")
-        },
-        _step_of,
-    ),
-    (
-        {
-            "tuner.cost": Quantity(
-                "cost of the tuned slew", help="none where training diverged", is_number=True
-            ),
-            "tuner.cost_best_constant": Quantity(
-                "cost with the best constant gain", help="same slew", is_number=True
-            ),
-            "tuner.trials": Quantity("trials", help="slews of the training", is_number=True),
-            "tuner.is_zero": Quantity(
-                "zero gain", help="1 where the moment gain went to zero, else 0", is_number=True
-            ),
-            f"{TRIAL_COST}.1": Quantity("cost of trial 1", help="none after a divergence", is_number=True),
-            "tuner.stopped": Quantity("stopped", help="trial and sample of a divergence"),
-        },
-        _tuner_of,
-    ),
+    _natural_frequencies(),
+    _sensitivities(),
+    _intervals(),
+    _damping_ratios(),
+    _poles(),
+    _step_of_both(),
+    _tuning(),
 )
-COLUMNS = {name: column for columns, _ in ASKED for name, column in columns.items()}
+COLUMNS = {name: column for columns, _ in SOURCES for name, column in columns.items()}
 
 
 def column_names(words: Sequence[str]) -> tuple[str, ...]:
@@ -310,13 +297,14 @@ def column_names(words: Sequence[str]) -> tuple[str, ...]:
     column.
     """
     found: dict[str, None] = {}
-    for word in [each for name in words for each in (LOOPS if name == CARD else (name,))]:
+    loops = {CARD: LOOPS}
+    for word in chain.from_iterable(loops.get(name, (name,)) for name in words):
         begun = [name for name in COLUMNS if f"{name}.".startswith(f"{word}.")]
         after = [name for name in COLUMNS if f"{name}.".partition(".")[2].startswith(f"{word}.")]
         own = [word] if first_of(word) in COLUMNS else begun or after
         if not own:
-            parts = {each for name in COLUMNS for each in (name, *name.split(".")) if not each.isdigit()}
-            must_be_known("ask", word, sorted({CARD, *parts}))
+            parts = {CARD, *COLUMNS, *".".join(COLUMNS).split(".")}
+            must_be_known("ask", word, sorted(each for each in parts if not each.isdigit()))
         found |= dict.fromkeys(own)
     require(found, "ask", "", f"name at least one quantity: {CARD}, modes, damped_modes, poles, step, tuner")
     return tuple(found)
@@ -341,7 +329,7 @@ def order_of(word: str) -> tuple[str, ...]:
 def sources_of(names: Sequence[str]) -> list[tuple[Set[str], Values]]:
     """Return the functions that have values of these columns, each with its own columns."""
     found = list[tuple[Set[str], Values]]()
-    for columns, values in ASKED:
+    for columns, values in SOURCES:
         own = dict.fromkeys(name for name in names if first_of(name) in columns)
         found += [(own.keys(), values)] * bool(own)
     return found
@@ -356,11 +344,5 @@ def values_of(one: Subject, sources: Sequence[tuple[Set[str], Values]]) -> dict[
             found |= values(one, own)
         except TfarmError as error:
             reasons.append(f"{min(own).split('.')[0]}: {error}")
-    names = (name for own, _ in sources for name in own)
+    names = chain.from_iterable(own for own, _ in sources)
     return {**{name: found.get(name) for name in names}, FAILED: "; ".join(reasons) or None}
-
-
-# ------------------------------------------------------------------------------------------------------------ findings
-
-
-# ------------------------------------------------------------------------------------------------------------ responses

@@ -42,24 +42,12 @@ ChunkTask = tuple[int, Callable[[], Chunk]]
 Engine = Callable[[Iterator[ChunkTask]], Iterator[tuple[int, Chunk]]]
 # keys of errors
 OUT = "--out"
-SCHEDULER = "--scheduler"
 # column of the number of the row, from 0
 ROW = "row"
-FILE = "study.json"
 PARQUET = ".parquet"
 STUDY_FILE = "study.toml"
-# rows whose cost is measured, and whose arms are built, before the first run
-PILOT = 3
+# rows whose arms are built before the first run
 CHECKED = 1000
-# of a chunk
-LEAST_SECONDS = 5.0
-MOST_SECONDS = 30.0
-# where that leaves them within these
-CHUNKS_A_WORKER = 10
-# arms whose frequencies are found together; the exact numbers of twice as many are kept
-BATCH = 32
-# seconds for a scheduler to answer, and for its first worker
-PATIENCE = 20
 
 
 @frozen
@@ -100,8 +88,10 @@ def chunk(plan: StudyPlan, first: int, last: int, listed: Real | None = None) ->
 def table_of(plan: StudyPlan, first: int, rows: Real) -> Chunk:
     """Return the table of rows of values (rows, keys), numbered from `first`."""
     table: Chunk = {name: [] for name in plan.columns}
-    for start in range(0, len(rows), BATCH):
-        batch = rows[start : start + BATCH].tolist()
+    # arms whose frequencies are found together; the exact numbers of twice as many are kept
+    together = 32
+    for start in range(0, len(rows), together):
+        batch = rows[start : start + together].tolist()
         subjects = [_attempt(plan.subjects.at, row) for row in batch]
         _attempt(prepare, [each for each in subjects if isinstance(each, Subject)], plan.names)
         for number, (row, subject) in enumerate(zip(batch, subjects, strict=True), start=first + start):
@@ -133,10 +123,10 @@ def _attempt(function: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def seconds_an_arm(plan: StudyPlan, rows: Real) -> float:
-    """Return the mean time of the first rows of values (rows, keys) [s]."""
+    """Return the mean time of the last three of some rows of values (rows, keys) [s]."""
     # which compiles
     table_of(plan, 0, rows[:1])
-    pilot = rows[-PILOT:]
+    pilot = rows[-3:]
     began = time.perf_counter()
     table_of(plan, 0, pilot)
     return (time.perf_counter() - began) / len(pilot)
@@ -145,7 +135,8 @@ def seconds_an_arm(plan: StudyPlan, rows: Real) -> float:
 def rows_a_chunk(cost: float, count: int, workers: int) -> int:
     """Return the rows of a chunk of 5 to 30 s for arms of that cost [s], so that all workers end together."""
     whole = cost * count / workers
-    seconds = min(max(whole / CHUNKS_A_WORKER, LEAST_SECONDS), MOST_SECONDS)
+    # ten chunks a worker, where they last that long
+    seconds = min(max(whole / 10, 5.0), 30.0)
     return min(math.ceil(count / (workers * max(1, round(whole / seconds)))), 50_000)
 
 
@@ -255,10 +246,11 @@ def open_study(
     `rows` are the values of the first rows.  Raises ParameterError for a folder that has another study.
     """
     space = plan.space
-    file = folder / FILE
+    name = "study.json"
+    file = folder / name
     suffix = PARQUET if importlib.util.find_spec("pyarrow") else ".csv"
     hashes = {
-        name: hashlib.sha256(content).hexdigest() for name, content in files.items() if name != STUDY_FILE
+        each: hashlib.sha256(content).hexdigest() for each, content in files.items() if each != STUDY_FILE
     }
     inputs = json.loads(
         json.dumps(
@@ -277,7 +269,7 @@ def open_study(
     )
     if file.exists():
         known = validated_file(
-            StudyRecord, file, 1 << 20, key=OUT, what=f"a {FILE} of tfarm study; choose another folder"
+            StudyRecord, file, 1 << 20, key=OUT, what=f"a {name} of tfarm study; choose another folder"
         )
         other = sorted(key for key in {*inputs, *known.inputs} if known.inputs.get(key) != inputs.get(key))
         require(
@@ -288,14 +280,15 @@ def open_study(
         )
         count = known.rows_a_part
     else:
-        count = size or rows_a_chunk(seconds_an_arm(plan, rows[:PILOT]), space.count, workers)
+        count = size or rows_a_chunk(seconds_an_arm(plan, rows[:3]), space.count, workers)
     digest = hashlib.sha256(json.dumps([inputs, count]).encode()).hexdigest()
     parts = StudyFolder(folder, plan, digest, count, suffix, space.count)
     # is refused before a file is written
     parts.written()
-    text = StudyRecord(inputs=inputs, rows_a_part=count).model_dump_json(indent=1)
-    for name, content in {**files, FILE: f"{text}\n".encode()}.items() if not file.exists() else ():
-        write_file(folder / name, content, key=OUT)
+    if not file.exists():
+        text = StudyRecord(inputs=inputs, rows_a_part=count).model_dump_json(indent=1)
+        for each, content in {**files, name: f"{text}\n".encode()}.items():
+            write_file(folder / each, content, key=OUT)
     return parts
 
 
@@ -411,23 +404,25 @@ def check_rows(plan: StudyPlan, rows: Real) -> None:
 # ------------------------------------------------------------------------------------------------------------ cluster
 
 
-def cluster(scheduler: str) -> Any:
+def cluster(scheduler: str, patience: float = 20) -> Any:
     """Return a client of a Dask scheduler, such as tcp://host:8786.  Raises ParameterError where none answers.
 
-    Certificates of a tls:// address are those of Dask's own configuration (distributed.comm.tls).
+    It has `patience` [s] to answer, and as long for its first worker.  Certificates of a tls:// address are those of
+    Dask's own configuration (distributed.comm.tls).
     """
-    distributed = extra("distributed", "cluster", SCHEDULER, scheduler)
+    key = "--scheduler"
+    distributed = extra("distributed", "cluster", key, scheduler)
     # whose errors come as one line of ours
     for name in ("distributed", "distributed.client"):
         getLogger(name).setLevel("CRITICAL")
     try:
-        client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
-        client.wait_for_workers(1, timeout=PATIENCE)
+        client = distributed.Client(scheduler, timeout=patience, set_as_default=False)
+        client.wait_for_workers(1, timeout=patience)
     except (OSError, ValueError, TypeError) as error:
         raise ParameterError(
-            key=SCHEDULER,
+            key=key,
             value=scheduler,
-            remedy=f"no scheduler with a worker answers within {PATIENCE} s ({str(error)[:120]}); give tcp://HOST:PORT",
+            remedy=f"no scheduler with a worker answers within {patience:g} s ({str(error)[:120]}); give tcp://HOST:PORT",
         ) from None
     return client
 

@@ -56,7 +56,7 @@ from tfarm.studies.running import (
     run_parts,
 )
 from tfarm.studies.sobol import SobolIndex, sobol_indices
-from tfarm.studies.space import MOST_SEED, listing_of, space_of
+from tfarm.studies.space import listing_of, space_of
 from tfarm.studies.worst import WorstArm, worst_arm
 
 
@@ -237,13 +237,10 @@ def study(
     """
     case = Case(arm, default_gains(arm) if law is None else law, chain)
     workers = usual_workers(client) if workers is None else workers
-    for key, value in {
-        "draws": draws,
-        "seed": seed,
-        "workers": workers,
-        "part": 1 if part is None else part,
-    }.items():
-        whole(key, value, int(key != "seed"), MOST_SEED, f"a whole number from {int(key != 'seed')}")
+    counts = {"draws": draws, "seed": seed, "workers": workers, "part": 1 if part is None else part}
+    for key, value in counts.items():
+        least = 0 if key == "seed" else 1
+        whole(key, value, least, 2**63, f"a whole number from {least}")
     known = None if posterior is None else load_posterior(posterior)
     space = space_of(
         over or {},
@@ -259,19 +256,17 @@ def study(
     )
     is_possible = not sobol or (space.is_independent and posterior is None and len(space.keys) > 1)
     require(is_possible, "sobol", sobol, "needs two or more independent distributions")
-    files = files_of(
-        case,
-        {
-            "over": over or {},
-            "ask": ask,
-            "draws": draws,
-            "seed": seed,
-            "rows": rows,
-            "posterior": posterior,
-            "worst": worst,
-            "sobol": sobol,
-        },
-    )
+    declared = {
+        "over": over or {},
+        "ask": ask,
+        "draws": draws,
+        "seed": seed,
+        "rows": rows,
+        "posterior": posterior,
+        "worst": worst,
+        "sobol": sobol,
+    }
+    files = files_of(case, declared)
     engine = partial(share_tasks, count=workers) if client is None else partial(on_cluster, client=client)
     deadline = time.monotonic() + (math.inf if stop_after is None else stop_after)
     with locked_folder(Path(out), key=OUT):
