@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -80,19 +81,18 @@ def section_table(
     }
     options = {name: f"--{name.replace('_', '-')}" for name in sizes}
     given = [name for name, size in sizes.items() if size is not None]
-    last = (given or ["width"])[-1]
+    last = given[-1] if given else "width"
     shapes = [shape for shape, of in SHAPES.items() if set(given) <= set(of.dimensions)]
     require(shapes, options[last], sizes[last], f"give the sizes of one section: {sections}")
-    shape = (
-        shapes[0] if given else value_or_prompt(options[last], None, f"section: {sections}", str, "rectangle")
-    )
+    shape = shapes[0]
+    if not given:
+        shape = value_or_prompt(options[last], None, f"section: {sections}", str, "rectangle")
     must_be_known("section", shape, SHAPES)
-    return {"shape": shape} | {
-        name: value_or_prompt(
-            options[name], sizes[name], "{0.label} ({0.help}) [m]".format(file_key(f"link.section.{name}"))
-        )
-        for name in SHAPES[shape].dimensions
-    }
+    table = {"shape": shape}
+    for name in SHAPES[shape].dimensions:
+        key = file_key(f"link.section.{name}")
+        table[name] = value_or_prompt(options[name], sizes[name], f"{key.label} ({key.help}) [m]")
+    return table
 
 
 @dataclass(frozen=True)
@@ -131,9 +131,7 @@ class Presets:
 def list_presets() -> Presets:
     """Return the arms that come with tfarm."""
     names = [each.name for each in fields(Preset)]
-    return Presets(
-        [Preset(*(getattr(arm, name) for name in names)) for arm in map(tfarm.load, tfarm.presets())]
-    )
+    return Presets([Preset(*attrgetter(*names)(tfarm.load(preset))) for preset in tfarm.presets()])
 
 
 @add_command(
@@ -176,17 +174,17 @@ def new(
     from tfarm.assessment.arm_check import with_damping
 
     if presets:
-        refuse({"FILE": file and str(file)}, "--list writes no file: leave this out")
+        require(file is None, "FILE", str(file), "--list writes no file: leave this out")
         show(list_presets())
         return
     refuse(
-        {"--json": show.keywords["json"]}, "a file is written: give --list for the arms that come with tfarm"
+        {"json": show.keywords["json"]}, "a file is written: give --list for the arms that come with tfarm"
     )
     if file is None:
         raise ParameterError(key="FILE", value=MISSING, remedy="give a name that ends with .toml, or --list")
     require(file.suffix == ".toml", "FILE", str(file), "give a name that ends with .toml")
     require(force or not os.path.lexists(file), "FILE", str(file), "exists already; --force replaces it")
-    refuse({"--damping-ratio": None if damping is None else damping_ratio}, "give it or --damping, not both")
+    refuse({"damping-ratio": None if damping is None else damping_ratio}, "give it or --damping, not both")
     tables = {
         "name": file.stem,
         "link": ({} if damping is None else {"damping": damping}) | link() | {"section": section()},

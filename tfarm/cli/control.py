@@ -178,7 +178,7 @@ def map_plane(
     typed = {RATE_GAIN: k1, MOMENT_GAIN: k2}
     if vary or law:
         remedy = "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice"
-        refuse({f"--{name}": value for name, value in {**typed, ANGLE_GAIN: kp or None}.items()}, remedy)
+        refuse({**typed, ANGLE_GAIN: kp or None}, remedy)
         ranges = dict(vary or [])
         remedy = "give two numbers of the law, such as --vary hub_angle=0,10 --vary delay=0,0.02"
         require(len(ranges) == 2, "--vary", [name for name, _ in vary or []], remedy)

@@ -349,7 +349,7 @@ def study_arguments(
     # an arm's file names no arm
     if "arm" in file.tables:
         refuse(
-            {f"--{key}": value for key, value in typed.items()},
+            typed,
             f"the study is that of {file.name}; leave this out",
         )
         return load_study(file), None

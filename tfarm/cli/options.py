@@ -223,7 +223,7 @@ def law_of_options(
     if other is not None:
         file = load_tables(other)
         refuse(
-            {f"--{gain}": value for gain, value in gains.items()},
+            gains,
             f"the law is that of {file.name}; leave this out",
         )
     own = None if gains else load_law(file)
@@ -305,6 +305,6 @@ def outputs_on(
 
 
 def refuse(others: Mapping[str, Any], remedy: str) -> None:
-    """Raise ParameterError for an option that another one excludes."""
-    for key, value in others.items():
-        require(value is None or value is False, key, value, remedy)
+    """Raise ParameterError for an option, by its name as a parameter, that another one excludes."""
+    for name, value in others.items():
+        require(value is None or value is False, f"--{name.replace('_', '-')}", value, remedy)

@@ -144,13 +144,13 @@ def open_streams() -> None:
 
 def check_words(arguments: list[str]) -> None:
     """Raise ParameterError for 5_0, Python's own spelling, an empty path, and a "-" that is no file or one of two."""
-    words = [
-        word for argument in arguments for word in argument.split("=", 1 if argument.startswith("--") else 0)
-    ]
+    words: list[str] = []
+    for argument in arguments:
+        words += argument.split("=", 1 if argument.startswith("--") else 0)
     options = [(option, text) for option, text in pairwise(words) if option.startswith("--")]
-    takers = [option for option, text in options if text == STANDARD_OUTPUT] + ["--json"] * (
-        "--json" in words
-    )
+    takers = [option for option, text in options if text == STANDARD_OUTPUT]
+    if "--json" in words:
+        takers.append("--json")
     files = [text for option, text in options if option in WRITTEN and text != STANDARD_OUTPUT]
     for option, text in options:
         if option not in PATHS:

@@ -17,6 +17,7 @@ encoder, where a chain estimates the hub rate, is (1 - a)/T (z - 1)/(z - a) time
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -154,7 +155,9 @@ def in_single(law: Law) -> Law:
 
     Raises ParameterError for two parts on one signal, whose sum is rounded, and for a number beyond float32.
     """
-    names = [name for part in law.parts for name in part.signals if name]
+    names: list[str] = []
+    for part in law.parts:
+        names += filter(None, part.signals)
     remedy = "in float32 a signal has one part: add them up first"
     require(len(set(names)) == len(names), "converters.arithmetic", "float32", remedy)
     return replace(law, parts=tuple(Part(part.signals, _single_block(part.block)) for part in law.parts))
@@ -180,10 +183,10 @@ def with_estimate(law: Law, chain: Chain) -> Law:
         return law
     T = chain.sampling.period
     a = float(np.exp(-chain.converters.rate_filter * T))
-    return replace(law, parts=tuple(_differenced(part, a, T) for part in law.parts), references=())
+    return replace(law, parts=tuple(_from_angle(part, a, T) for part in law.parts), references=())
 
 
-def _differenced(part: Part, a: float, T: float) -> Part:
+def _from_angle(part: Part, a: float, T: float) -> Part:
     """A part of a law with its columns of the hub rate replaced by columns of the hub angle.
 
     x_{k+1} = a x_k + angle,  rate = (1 - a)/T (angle + (a - 1) x_k)
@@ -242,19 +245,19 @@ class LawInZ:
         out = []
         for part, (poles, weight) in enumerate(zip(self.part_poles, weights, strict=True)):
             held, below = lowest_power(poles)
-            terms = [
-                (*lowest_power(zeros), weight * g * turned[row])
-                for n, row, g, zeros in self.columns
-                if n == part
-            ]
-            by_order = [
-                [value * factor for n, value, factor in terms if n == order] for order in range(held + 1)
-            ]
+            # by the power of delta that they are multiplied by
+            terms = defaultdict[int, list[float]](list)
+            pushes = []
+            for n, row, g, zeros in self.columns:
+                if n == part:
+                    power, lowest = lowest_power(zeros)
+                    pushes.append(weight * g * turned[row])
+                    terms[power].append(lowest * pushes[-1])
             # an integrator of the only signal, cancelled or not
-            is_reached = held and len(terms) == 1 and terms[0][2]
-            if is_reached or not all(map(_cancel, by_order[:held])):
+            is_reached = held and len(pushes) == 1 and pushes[0]
+            if is_reached or not all(_cancel(terms[power]) for power in range(held)):
                 return False
-            out += [each / below for each in by_order[held]]
+            out += [each / below for each in terms[held]]
         return _cancel(out)
 
 
@@ -277,30 +280,38 @@ def law_in_z(law: Law, acting: Law, chain: Chain) -> LawInZ:
     law = acting if chain.converters.is_single else law
     acting = with_estimate(acting, chain)
     alone = [acting.weighted(row).matrices() for row in np.eye(len(acting.parts)).tolist()]
-    (A, B, _, _), C, D = alone[0], *(np.vstack([each[n] for each in alone]) for n in (2, 3))
-    found = [_factors(part, law, chain) for part in law.parts]
-    columns = [
-        (n, acting.signals.index(name), g, zeros) for n, (_, of) in enumerate(found) for name, g, zeros in of
-    ]
-    return LawInZ(acting.signals, tuple(poles for poles, _ in found), tuple(columns), (A, B, C, D))
+    A, B, _, _ = alone[0]
+    C = np.vstack([each[2] for each in alone])
+    D = np.vstack([each[3] for each in alone])
+    poles = []
+    columns: list[PartColumn] = []
+    for n, part in enumerate(law.parts):
+        own, found = _factors(part, law, chain)
+        poles.append(own)
+        columns += [(n, acting.signals.index(name), g, zeros) for name, g, zeros in found]
+    return LawInZ(acting.signals, tuple(poles), tuple(columns), (A, B, C, D))
 
 
 def _factors(part: Part, law: Law, chain: Chain) -> tuple[Complex, list[tuple[str, float, Complex]]]:
     """The poles of one part in z, and signal, gain and zeros of each column."""
     T = chain.sampling.period
-    poles, found = block_factors(
-        part.block, "none" if law.is_discrete else law.rule, T, prewarp_speed(T, law.prewarp)
-    )
-    columns = [(name, -law.sign * g, zeros) for name, (g, zeros) in zip(part.signals, found, strict=True)]
-    columns = [each for each in columns if is_measured(each[0])]
+    rule = "none" if law.is_discrete else law.rule
+    poles, found = block_factors(part.block, rule, T, prewarp_speed(T, law.prewarp))
+    columns: list[tuple[str, float, Complex]] = []
+    for name, (g, zeros) in zip(part.signals, found, strict=True):
+        if is_measured(name):
+            columns.append((name, -law.sign * g, zeros))
     if chain.converters.hub_rate != "difference" or "hub_rate" not in part.signals:
         return poles, columns
     # -lag/T delta/(delta - lag) times the angle
     lag = float(np.expm1(-chain.converters.rate_filter * T))
-    return np.r_[poles, lag], [
-        ("hub_angle", -g * lag / T, np.r_[zeros, 0.0]) if name == "hub_rate" else (name, g, np.r_[zeros, lag])
-        for name, g, zeros in columns
-    ]
+    through = []
+    for name, g, zeros in columns:
+        if name == "hub_rate":
+            through.append(("hub_angle", -g * lag / T, np.r_[zeros, 0.0]))
+        else:
+            through.append((name, g, np.r_[zeros, lag]))
+    return np.r_[poles, lag], through
 
 
 def root_product(start: Complex, roots: Complex, more: Any = 0.0) -> Complex:

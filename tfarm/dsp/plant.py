@@ -70,7 +70,7 @@ class Plant:
             self, outputs=names, residues=self.residues[at], rigid=self.rigid[at], static=self.static[at]
         )
 
-    def joined(self, more: Plant) -> Plant:
+    def join(self, more: Plant) -> Plant:
         """The plant with the outputs of another of the same arm after its own; the other may lack the filter's pole."""
         # those of the arm, for any output
         assert np.array_equal(more.poles, self.poles[: more.poles.size])

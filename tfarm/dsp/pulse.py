@@ -108,15 +108,23 @@ class PulseTransfer:
 
         With no `base`, or one of -1, it is offset H(z); `delta` is z - 1, where that has more digits than z.
         """
-        gap = z[:, None] - self.multipliers if delta is None else delta[:, None] - self.shifts
-        rows = np.empty(0, np.int64) if base is None else np.flatnonzero(base >= 0)
-        near = (rows, rows if base is None else base[rows])
-        gap[near] = 1.0
-        share = offset[:, None] / gap
-        distance = z - 1.0 if delta is None else delta
-        share[near] = 1.0
-        distance = distance if base is None else np.where(base == self.poles.size - 1, offset, distance)
-        return self._summed(np.positive, share, z, offset, distance)
+        if delta is None:
+            gap = z[:, None] - self.multipliers
+            distance: Any = z - 1.0
+        else:
+            gap = delta[:, None] - self.shifts
+            distance = delta
+        if base is None:
+            share = offset[:, None] / gap
+        else:
+            # of a pole that is the base the share is 1
+            rows = np.flatnonzero(base >= 0)
+            own = (rows, base[rows])
+            gap[own] = 1.0
+            share = offset[:, None] / gap
+            share[own] = 1.0
+            distance = np.where(base == self.poles.size - 1, offset, distance)
+        return self._sum_terms(np.positive, share, z, offset, distance)
 
     def sizes(self, base: NDArray[np.int64], offset: Complex, delta: Complex) -> Real:
         """Sums (outputs, n) of the sizes of all terms of `scaled`, a bound on its rounding error in units of eps.
@@ -129,33 +137,39 @@ class PulseTransfer:
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.where(own, 1.0, abs(offset)[:, None] / gap * (1 + abs(delta)[:, None] / gap))
         distance = abs(np.where(base == self.poles.size - 1, offset, delta))
-        return self._summed(np.abs, share, z, abs(offset), distance)
+        return self._sum_terms(np.abs, share, z, abs(offset), distance)
 
-    def _summed(self, size: Callable[[Any], Any], share: Any, z: Any, offset: Any, distance: Any) -> Any:
-        """The terms of `scaled`, or their sizes: shares (n, poles) of r (early + late/z), static and rigid terms."""
-        residues, early, late = (size(each) for each in (self.residues, self.early, self.late))
-        value = (residues * early) @ share.T + np.outer(size(self.plant.static), offset / z)
-        if self.sampling.fraction:
+    def _sum_terms(self, size: Callable[[Any], Any], share: Any, z: Any, offset: Any, distance: Any) -> Any:
+        """Return the terms of `scaled`, or their sizes.
+
+        They are shares (n, poles) of r (early + late/z), static and rigid terms.
+        """
+        plant = self.plant
+        sampling = self.sampling
+        early = size(self.early)
+        late = size(self.late)
+        residues = size(self.residues)
+        value = (residues * early) @ share.T + np.outer(size(plant.static), offset / z)
+        if sampling.fraction:
             value = value + (residues * late) @ share.T / z
-        if self.plant.rigid[:, 0].any():
+        double = plant.rigid[:, 0]
+        if double.any():
             push = early[-1] + late[-1] / z
-            ramp = self.ramps[0] + self.ramps[1] / z
-            twice = (self.sampling.period * push / distance + ramp) / distance
-            value = value + np.outer(size(self.plant.rigid[:, 0]), twice * offset)
-        return value * z ** (-self.sampling.whole_delay)
+            now, before = self.ramps
+            twice = (sampling.period * push / distance + (now + before / z)) / distance
+            value = value + np.outer(size(double), twice * offset)
+        return value * z ** (-sampling.whole_delay)
 
-    def folded(self) -> PulseTransfer:
-        """The same with every pole that decays within a sample as a static share."""
-        gone = self.plant.poles.real * (1 - self.sampling.fraction) * self.sampling.period < -FORGOTTEN
+    def without_fast_poles(self) -> PulseTransfer:
+        """Return the same with every pole that decays within a sample as a static share."""
+        of = self.plant
+        gone = of.poles.real * (1 - self.sampling.fraction) * self.sampling.period < -FORGOTTEN
         if not gone.any():
             return self
-        static = self.plant.static - (self.plant.residues[:, gone] / self.plant.poles[gone]).real.sum(axis=1)
+        kept = ~gone
+        static = of.static - (of.residues[:, gone] / of.poles[gone]).real.sum(axis=1)
         plant = replace(
-            self.plant,
-            poles=self.plant.poles[~gone],
-            residues=self.plant.residues[:, ~gone],
-            static=static,
-            mode=self.plant.mode[~gone],
+            of, poles=of.poles[kept], residues=of.residues[:, kept], static=static, mode=of.mode[kept]
         )
         return replace(self, plant=plant)
 
@@ -179,20 +193,21 @@ class PulseTransfer:
     @cached_property
     def _matrices(self) -> tuple[Real, Real, Real]:
         upper, real = self.kept()
+        plant = self.plant
         T = self.sampling.period
         d = self.sampling.whole_delay
-        z = self.multipliers
+        z = self.multipliers[upper]
         first = 2 * np.arange(upper.size)
         n = self.integrals_at + 2
-        A = np.diag(np.r_[np.repeat(z[upper].real, 2), z[real].real, 1.0, 1.0, np.zeros(d + 1)])
-        A[first, first + 1] = -z[upper].imag
-        A[first + 1, first] = z[upper].imag
+        decays = self.multipliers[real].real
+        A = np.diag(np.r_[np.repeat(z.real, 2), decays, 1.0, 1.0, np.zeros(d + 1)])
+        A[first, first + 1] = -z.imag
+        A[first + 1, first] = z.imag
         A[n - 2, n - 1] = T
         A[n:, n:] = np.eye(d + 1, k=-1)
         pairs = np.ascontiguousarray(2 * self.residues[:, upper].conj()).view(float)
-        C = np.c_[
-            pairs, self.residues[:, real].real, self.plant.rigid, np.zeros((len(pairs), d)), self.plant.static
-        ]
+        singles = self.residues[:, real].real
+        C = np.c_[pairs, singles, plant.rigid, np.zeros((len(pairs), d)), plant.static]
         now, before = (
             np.r_[push[upper].view(float), push[real].real, ramp, push[-1].real]
             for push, ramp in zip((self.early, self.late), self.ramps, strict=True)
@@ -201,13 +216,14 @@ class PulseTransfer:
         A[:n, -1] = before
         newest = A[:, -2] if d else B
         newest[:n] = now
-        if (slow := self.plant.slow_hub_pole(self.sampling.period)) is not None:
+        slow = plant.slow_hub_pole(T)
+        if slow is not None:
             place = 2 * upper.size + int(np.flatnonzero(real == slow)[0])
-            p = float(self.plant.poles[slow].real)
+            p = float(plant.poles[slow].real)
             self._integrate(A, newest, p, (place, n - 1))
             # R/s + r/(s - p) = -R p/(s (s - p)) + (r + R)/(s - p)
-            C[:, place] += self.plant.rigid[:, 1]
-            C[:, n - 1] = -p * self.plant.rigid[:, 1]
+            C[:, place] += plant.rigid[:, 1]
+            C[:, n - 1] = -p * plant.rigid[:, 1]
         return A, B, C
 
     def _integrate(self, A: Real, newest: Real, p: float, at: tuple[int, int]) -> None:

@@ -43,21 +43,19 @@ class SensedPlant:
     @property
     def unfiltered(self) -> Plant:
         """All signals in the order of their names, without filters."""
-        places = dict.fromkeys(self.read.places)
-        whole = reduce(Plant.joined, self.plants)
-        keys = [
-            (place, name) for place, plant in zip(places, self.plants, strict=True) for name in plant.outputs
-        ]
-        at = [
-            keys.index((place, each.name))
-            for each, place in zip(self.read.outputs, self.read.places, strict=True)
-        ]
-        return replace(whole.rows(at, self.read.names), arm=self.arm)
+        read = self.read
+        whole = reduce(Plant.join, self.plants)
+        keys: list[tuple[float, str]] = []
+        for place, plant in zip(dict.fromkeys(read.places), self.plants, strict=True):
+            keys += [(place, name) for name in plant.outputs]
+        wanted = zip(read.places, read.outputs, strict=True)
+        at = [keys.index((place, each.name)) for place, each in wanted]
+        return replace(whole.rows(at, read.names), arm=self.arm)
 
     def own_moment(self, sampling: Sampling) -> Real:
         """The row of C that reads the arm's own root moment, one of the signals, ahead of the anti-alias filter."""
         alone = self.unfiltered.rows([self.read.names.index("root_moment")], ("root_moment",))
-        pulse = PulseTransfer(self.together.joined(alone), sampling).folded()
+        pulse = PulseTransfer(self.together.join(alone), sampling).without_fast_poles()
         return pulse.matrices()[2][-1]
 
     def with_modes(self, count: int) -> SensedPlant:

@@ -115,10 +115,11 @@ class Simulator:
         self.others = tuple(dict.fromkeys(name for name in outputs if name not in RECORDED))
         self.measured = tuple(dict.fromkeys((*AT_HUB, *self.law.signals)))
         sensed = sensed_plant(arm, chain, self.measured, count)
-        self.plant = sensed.together
+        plant = sensed.together
         for names in filter(None, (RECORDED, self.others)):
-            self.plant = self.plant.joined(sensed_plant(arm, chain, names, count).unfiltered)
-        self._first: Complex = np.zeros(self.plant.poles.size, complex)
+            plant = plant.join(sensed_plant(arm, chain, names, count).unfiltered)
+        self.plant = plant
+        self._first: Complex = np.zeros(plant.poles.size, complex)
         if scenario.tip_offset:
             self._release(sensed.unfiltered, scenario.tip_offset)
         self.kept = np.nonzero(self.plant.poles.imag >= 0)[0]
@@ -137,7 +138,7 @@ class Simulator:
 
     def run(self) -> Simulation:
         """Simulate the law over the scenario, from its start."""
-        return self._driven(self.law, self.gains)
+        return self._run_law(self.law, self.gains)
 
     def linear(self, gains: HubFeedback) -> Simulation:
         """Simulate u = r + gains . (wanted - measured) instead of the simulator's own law.
@@ -145,9 +146,9 @@ class Simulator:
         Raises ParameterError for I_h = 0 with moment feedback.
         """
         law, _ = acting_law(self.case.under(gains))
-        return self._driven(law, gains)
+        return self._run_law(law, gains)
 
-    def _driven(self, law: Law, gains: HubFeedback | None) -> Simulation:
+    def _run_law(self, law: Law, gains: HubFeedback | None) -> Simulation:
         """A law in z over the scenario, and its gains at the hub, if it is of these."""
         columns = (*law.signals, *law.wanted)
         kind = np.float32 if self.electronics.is_single else float
@@ -162,7 +163,7 @@ class Simulator:
 
     def controller(self, controller: ControlFunction) -> Simulation:
         """Simulate a callable from a `Measurement` to a torque [N m]; its numbers are float32 if the arithmetic is."""
-        return self._stepped(lambda m: (float(controller(m)), 0.0), None)
+        return self._run_rule(lambda m: (float(controller(m)), 0.0), None)
 
     def gain_schedule(self, K1: float, gain: Callable[[Measurement], float], Kp: float = 0.0) -> Simulation:
         """Simulate the law of `linear` with K2 = gain(measurement) at each sample, recorded as `gain`."""
@@ -172,7 +173,7 @@ class Simulator:
             K = float(gain(m))
             return m.feedforward + m.servo(law) - K * m.vibration, K
 
-        return self._stepped(torque, np.zeros(self.scenario.feedforward.size))
+        return self._run_rule(torque, np.zeros(self.scenario.feedforward.size))
 
     def finer(self, between: int) -> Self:
         """The same with `between` records in each sample."""
@@ -189,7 +190,7 @@ class Simulator:
         row = self.plant.outputs.index("hub_angle", len(self.measured))
         return kernel.model_of(self.plant, self.kept, self.chain.sampling, self.between, row)
 
-    def _stepped(self, rule: Callable[[Measurement], tuple[float, float]], gain: Real | None) -> Simulation:
+    def _run_rule(self, rule: Callable[[Measurement], tuple[float, float]], gain: Real | None) -> Simulation:
         """The loop of `kernel.run_samples` in Python."""
         model = self.model
         state = self._start()
@@ -234,13 +235,15 @@ class Simulator:
 
         `unfiltered` are the measured signals ahead of the filters.
         """
-        first, amplitude = first_mode(self.plant, offset)
+        plant = self.plant
+        first, amplitude = first_mode(plant, offset)
         n = len(self.measured)
-        held = np.zeros(len(self.plant.outputs))
+        held = np.zeros(len(plant.outputs))
         self._first[first] = amplitude
-        held[:n] = 2 * ((unfiltered.residues[:, first] - self.plant.residues[:n, first]) * amplitude).real
+        held[:n] = 2 * ((unfiltered.residues[:, first] - plant.residues[:n, first]) * amplitude).real
         if held.any():
-            self.plant, self._first = with_held_filter(self.plant, held), np.r_[self._first, 1.0]
+            self.plant = with_held_filter(plant, held)
+            self._first = np.r_[self._first, 1.0]
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
         """Energy of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the residue of the hub rate, and rigid."""
@@ -252,32 +255,31 @@ class Simulator:
         """The record of `done` samples."""
         stopped = None
         error = None
+        plant = self.plant
+        task = self.scenario
+        kept = self.kept
+        T = task.period
         if done < state.torque.size:
-            of_root = np.nan_to_num(
-                abs(self.plant.residues[kernel.MOMENT, self.kept] * state.amplitude), nan=np.inf
-            )
-            stopped = Stop(
-                done * self.scenario.period, int(self.plant.mode[self.kept][int(np.argmax(of_root))])
-            )
-        elif self.plant.arm.is_undamped and not self.chain.actuator.hub_damping > 0:
-            before = self._energy(self._first[self.kept] + self.scenario.impulse, self.scenario.impulse)
+            shares = abs(plant.residues[kernel.MOMENT, kept] * state.amplitude)
+            largest = int(np.argmax(np.nan_to_num(shares, nan=np.inf)))
+            stopped = Stop(done * T, int(plant.mode[kept][largest]))
+        elif plant.arm.is_undamped and not self.chain.actuator.hub_damping > 0:
+            before = self._energy(self._first[kept] + task.impulse, task.impulse)
             after = self._energy(state.amplitude, state.rigid[kernel.Integral.SINGLE])
             work, moved = state.work
             error = float(abs(after - before - work) / max(before + moved, LEAST_SIZE))
-        p = self.plant.poles[self.kept]
-        weights = self.model.weights[len(self.measured) :][: len(RECORDED)]
+        p = plant.poles[kept]
         is_ringing = p.imag > -p.real
-        size = abs(weights[:, is_ringing]) * np.sqrt(state.circle[is_ringing])
-        T = self.scenario.period
-        m = self.between
+        weights = self.model.weights[len(self.measured) :][: len(RECORDED), is_ringing]
+        size = abs(weights) * np.sqrt(state.circle[is_ringing])
         between = None
-        if m:
+        if m := self.between:
             at = T * (np.arange(done)[:, None] + (np.arange(m) + 1) / (m + 1))
             between = self._trace(at.ravel(), state.fine[:done].reshape(done * m, -1))
         return Simulation(
-            scenario=self.scenario,
+            scenario=task,
             chain=self.chain,
-            at_samples=self._trace(self.scenario.t[:done], state.record[:done]),
+            at_samples=self._trace(task.t[:done], state.record[:done]),
             between=between,
             measured=state.record[:done, : len(AT_HUB)],
             torque=state.torque[:done],

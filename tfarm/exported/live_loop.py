@@ -303,7 +303,7 @@ def sampled_numbers(loop: Sampled) -> LiveNumbers:
     These are 2, 1 where it is damped or driven through a motor, or 0.
     """
     plant = sensed_plant(loop.plant.arm, loop.chain, FED_BACK, loop.plant.count).together
-    folded = PulseTransfer(plant, loop.chain.sampling).folded().plant
+    folded = PulseTransfer(plant, loop.chain.sampling).without_fast_poles().plant
     return {**_sampling(loop.chain), **_plant(folded), "states": _orders(plant)[0], "modes": plant.count}
 
 

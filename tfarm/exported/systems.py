@@ -105,7 +105,7 @@ def plant_system(case: Case) -> NamedSystem:
     acting, late = acting_law(case)
     signals = with_estimate(acting, late).signals
     sensed = sensed_plant(case.arm, late, list(dict.fromkeys((*signals, "tip_displacement"))), USUAL_MODES)
-    A, B, C = PulseTransfer(sensed.together, late.sampling).folded().matrices()
+    A, B, C = PulseTransfer(sensed.together, late.sampling).without_fast_poles().matrices()
     matrices = A, B[:, None], C, np.zeros((len(C), 1))
     states = tuple(f"plant{n + 1}" for n in range(len(A)))
     name = f"{case.arm.name}, sampled"

@@ -52,7 +52,7 @@ class SampledRig:
     @cached_property
     def pulse(self) -> PulseTransfer:
         """The pulse transfer functions to the signals of the law."""
-        return PulseTransfer(self.plant, self.chain.sampling).folded()
+        return PulseTransfer(self.plant, self.chain.sampling).without_fast_poles()
 
     @property
     def exact(self) -> Callable[[Complex], Complex]:

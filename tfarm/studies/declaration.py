@@ -69,10 +69,9 @@ def files_of(case: Case, declared: Mapping[str, Any]) -> dict[str, bytes]:
         table = {**law_head(own), "sign": -1, "matrices": matrices, "signals": columns}
         text = toml_text(toml_tables(table, "law"))
     places = {key: declared[key] and os.path.abspath(declared[key]) for key in PATHS}
-    over = {
-        key: {kind: tuple(numbers) for kind, numbers in entry.items()}
-        for key, entry in declared["over"].items()
-    }
+    over = {}
+    for key, entry in declared["over"].items():
+        over[key] = {kind: tuple(numbers) for kind, numbers in entry.items()}
     kept = {"arm": arm_file, **declared, **places, "ask": tuple(declared["ask"]), "over": over}
     study = toml_text(toml_tables({key: value for key, value in kept.items() if value or key == "seed"}))
     return {

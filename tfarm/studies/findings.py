@@ -22,7 +22,7 @@ from tfarm.loop.curve import decibels
 from tfarm.response import transfer
 from tfarm.response.frequency import resonant_band
 from tfarm.schema import Percent, Quantity
-from tfarm.studies.quantities import LOOPS, STABLE, loop_of, quantity_of
+from tfarm.studies.quantities import LOOPS, STABLE, is_labelled_number, loop_of, quantity_of
 from tfarm.studies.space import Subjects
 
 CONFIDENCE = 0.95
@@ -125,10 +125,8 @@ def shares_of(
 def spreads_of(table: Mapping[str, Any], names: Sequence[str], keys: Sequence[str]) -> tuple[Spread, ...]:
     """Return the distribution of each quantity that has finite values."""
     found = []
-    for name in names:
+    for name in filter(is_labelled_number, names):
         of = quantity_of(name)
-        if not (of.is_number and of.label):
-            continue
         is_known = np.isfinite(table[name])
         if not is_known.any():
             continue

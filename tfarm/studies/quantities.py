@@ -59,6 +59,12 @@ def quantity_of(name: str) -> Quantity:
     return COLUMNS.get(name, replace(of, label=f"{of.label.removesuffix(' 1')} {name.rpartition('.')[2]}"))
 
 
+def is_labelled_number(name: str) -> bool:
+    """Return whether a column has numbers with a label."""
+    of = quantity_of(name)
+    return of.is_number and bool(of.label)
+
+
 def loop_of(name: str) -> str:
     """Return the loop of a column, empty for one of the arm alone."""
     return next((loop for loop in LOOPS if loop in name.split(".")), "")
@@ -315,7 +321,7 @@ def order_of(word: str) -> tuple[str, ...]:
 
     Raises ParameterError for a word of no number or of several.
     """
-    names = [name for name in column_names([word]) if quantity_of(name).is_number and quantity_of(name).label]
+    names = [*filter(is_labelled_number, column_names([word]))]
     require(
         len(names) == 1 or word in names,
         "worst",

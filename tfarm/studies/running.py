@@ -18,7 +18,7 @@ from functools import cached_property, partial
 from itertools import islice, takewhile
 from logging import getLogger
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,6 +40,22 @@ Row = dict[str, Any]
 ChunkTask = tuple[int, Callable[[], Chunk]]
 # yields each task with its table as it comes
 Engine = Callable[[Iterator[ChunkTask]], Iterator[tuple[int, Chunk]]]
+
+
+class Resources(NamedTuple):
+    """Engine of a run and its number of workers, the time [s] after which no part is begun, and its progress."""
+
+    engine: Engine
+    workers: int
+    deadline: float
+    progress: Progress
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the deadline has passed."""
+        return time.monotonic() >= self.deadline
+
+
 # keys of errors
 OUT = "--out"
 # column of the number of the row, from 0
@@ -213,7 +229,11 @@ class StudyFolder:
     def column(self, *names: str) -> dict[str, Any]:
         """Return columns of all written rows in order: arrays of numbers, NaN where there is none, and of texts."""
         tables = [self._read(self.path(number), names) for number in self.written()]
-        return {name: np.concatenate([np.empty(0), *(table[name] for table in tables)]) for name in names}
+        found = {}
+        for name in names:
+            columns = [table[name] for table in tables]
+            found[name] = np.concatenate([np.empty(0), *columns])
+        return found
 
     def _read(self, path: Path, names: Sequence[str]) -> dict[str, Any]:
         if self.suffix == PARQUET:
@@ -311,56 +331,52 @@ def run_parts(
     folder: Path,
     plan: StudyPlan,
     files: Mapping[str, bytes],
-    engine: Engine,
-    workers: int,
-    deadline: float,
+    resources: Resources,
     size: int | None,
-    progress: Progress,
 ) -> StudyFolder:
     """Write the missing parts of a study to its folder."""
     count = min(CHECKED, plan.space.count)
     listing = plan.space.listing
     rows = plan.space.rows(0, count, None if listing is None else next(listing.blocks([(0, count)])))
     check_rows(plan, rows)
-    parts = open_study(folder, plan, files, workers, size, rows)
+    parts = open_study(folder, plan, files, resources.workers, size, rows)
 
     def calls(ends: Sequence[tuple[int, int]]) -> Iterator[Callable[[], Chunk]]:
         blocks = [None] * len(ends) if listing is None else listing.blocks(ends)
         for (first, last), listed in zip(ends, blocks, strict=True):
             yield partial(chunk, plan, first, last, listed)
 
-    write_missing_parts(parts, calls, engine, deadline, progress, "parts of the study")
+    write_missing_parts(parts, calls, resources, "parts of the study")
     return parts
 
 
 def write_missing_parts(
     parts: StudyFolder,
     calls: Callable[[Sequence[tuple[int, int]]], Iterable[Callable[[], Chunk]]],
-    engine: Engine,
-    deadline: float,
-    progress: Progress,
+    resources: Resources,
     text: str,
 ) -> None:
-    """Write the missing parts by the calls for their ranges of rows; after the deadline [s] none is begun any more."""
-    done = set(parts.written())
+    """Write the missing parts by the calls for their ranges of rows; after the deadline none is begun any more."""
+    done = parts.written()
+    count = parts.count
     began = time.monotonic()
-    missing = [number for number in range(parts.count) if number not in done]
-    progress(len(done), parts.count, text)
+    missing = sorted({*range(count)} - {*done})
+    resources.progress(len(done), count, text)
     ends = [(number * parts.rows, min((number + 1) * parts.rows, parts.size)) for number in missing]
-    tasks = takewhile(lambda _: time.monotonic() < deadline, zip(missing, calls(ends), strict=True))
-    for ready, (number, table) in enumerate(engine(tasks), start=1):
+    tasks = takewhile(lambda _: not resources.is_over, zip(missing, calls(ends), strict=True))
+    for ready, (number, table) in enumerate(resources.engine(tasks), start=1):
         parts.write(number, table)
         left = (time.monotonic() - began) / ready * (len(missing) - ready)
-        progress(len(done) + ready, parts.count, f"{text}, {left:.0f} s left")
+        resources.progress(len(done) + ready, count, f"{text}, {left:.0f} s left")
 
 
 def search_rows(
-    parts: StudyFolder, search: Callable[[Callable[[Real], Row]], object], deadline: float
+    parts: StudyFolder, search: Callable[[Callable[[Real], Row]], object], resources: Resources
 ) -> list[Row] | None:
     """Return the rows of a search, which asks for the results of one row of values (1, keys) after another.
 
     Each is written as a part and computed once: an interrupted search goes on where it was.  None where it has no end
-    before the deadline [s].
+    before the deadline.
     """
     known = rows_of(parts.column(*parts.plan.columns))
     seen = list[Row]()
@@ -368,7 +384,7 @@ def search_rows(
     def result(values: Real) -> Row:
         n = len(seen)
         if n == len(known):
-            if time.monotonic() >= deadline:
+            if resources.is_over:
                 raise TimeoutError
             table = table_of(parts.plan, n, values)
             parts.write(n, table)

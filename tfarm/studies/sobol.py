@@ -12,11 +12,10 @@ import scipy
 
 from tfarm.arrays import Real
 from tfarm.schema import Quantity
-from tfarm.stopping import Progress
 from tfarm.studies.findings import CONFIDENCE
-from tfarm.studies.quantities import quantity_of
+from tfarm.studies.quantities import is_labelled_number
 from tfarm.studies.running import (
-    Engine,
+    Resources,
     StudyFolder,
     seconds_an_arm,
     table_of,
@@ -45,32 +44,33 @@ class SobolIndex(NamedTuple):
     note: Annotated[str, Quantity("note", help="reason where the indices are not determined")] = ""
 
 
-def sobol_indices(
-    study: StudyFolder, size: int, workers: int, engine: Engine, deadline: float, progress: Progress
-) -> tuple[SobolIndex, ...]:
+def sobol_indices(study: StudyFolder, size: int, resources: Resources) -> tuple[SobolIndex, ...]:
     """Return Sobol' indices of every quantity, of a sample of its own of N (numbers + 2) arms, written as parts.
 
     The first progress has their number and time.  A quantity without a finite value on each arm has no indices.  None
-    where the sample is not complete before the deadline [s].
+    where the sample is not complete before the deadline.
     """
     plan = study.plan
-    keys = study.plan.space.keys
-    names = [name for name in plan.names if quantity_of(name).is_number and quantity_of(name).label]
-    A, B = np.hsplit(
-        scipy.stats.qmc.Sobol(2 * len(keys), rng=np.random.default_rng(plan.space.seed)).random(size), 2
-    )
+    space = plan.space
+    keys = space.keys
+    count = len(keys)
+    sample = scipy.stats.qmc.Sobol(2 * count, rng=np.random.default_rng(space.seed)).random(size)
+    A, B = np.hsplit(sample, 2)
     # A with one column of B
-    pages = [np.where(np.arange(len(keys)) == n, B, A) for n in range(len(keys))]
-    rows = plan.space.values(np.clip(np.vstack([A, B, *pages]), *ENDS))
+    pages = [np.where(np.arange(count) == n, B, A) for n in range(count)]
+    rows = space.values(np.clip(np.vstack([A, B, *pages]), *ENDS))
     # all workers have some of a small sample
     parts = study.others(f"_sobol-{size}-", len(rows), 64, plan.names)
     if not parts.is_complete:
-        seconds = seconds_an_arm(plan, rows) * len(rows) / workers
-        progress(0, 0, f"Sobol' indices of {len(rows):,} further arms, about {seconds:.0f} s")
+        seconds = seconds_an_arm(plan, rows) * len(rows) / resources.workers
+        resources.progress(0, 0, f"Sobol' indices of {len(rows):,} further arms, about {seconds:.0f} s")
     calls = partial(map, lambda ends: partial(table_of, plan, ends[0], rows[slice(*ends)]))
-    write_missing_parts(parts, calls, engine, deadline, progress, "parts of Sobol' indices")
-    table = parts.column(*names) if parts.is_complete else {}
-    return tuple(index for name, values in table.items() for index in _indices(name, keys, values))
+    write_missing_parts(parts, calls, resources, "parts of Sobol' indices")
+    found: list[SobolIndex] = []
+    if parts.is_complete:
+        for name, values in parts.column(*filter(is_labelled_number, plan.names)).items():
+            found += _indices(name, keys, values)
+    return tuple(found)
 
 
 def _indices(name: str, keys: Sequence[str], values: Real) -> Iterator[SobolIndex]:

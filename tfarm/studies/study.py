@@ -50,6 +50,7 @@ from tfarm.studies.quantities import CARD, column_names, order_of, quantity_of
 from tfarm.studies.running import (
     OUT,
     ROW,
+    Resources,
     StudyFolder,
     StudyPlan,
     on_cluster,
@@ -144,15 +145,12 @@ class Study:
     def varied_numbers(self) -> list[Column]:
         """A row a varied number: its distribution or grid, and its value of the worst arm where that was found."""
         space = self.parts.plan.space
-        kinds = {
-            key: one_line(f"{each.kind} {', '.join(map(text, each.numbers))}", 60)
-            for key, each in space.over.items()
-        }
+        kinds = dict.fromkeys(space.keys, "list or posterior")
+        for key, each in space.over.items():
+            kinds[key] = one_line(f"{each.kind} {', '.join(map(text, each.numbers))}", 60)
         columns = [
             Column("key", "number", of=space.keys),
-            Column(
-                "distribution", "distribution", of=[kinds.get(key, "list or posterior") for key in space.keys]
-            ),
+            Column("distribution", "distribution", of=list(kinds.values())),
         ]
         if self.worst is not None:
             worst = list(self.worst.numbers.values())
@@ -162,16 +160,12 @@ class Study:
     @property
     def csv_table(self) -> Table:
         """Every row of the study."""
-        return Table(
-            columns=tuple(
-                Column(
-                    name,
-                    unit=quantity_of(name).unit if name in self.parts.plan.names else "",
-                    of=["" if each != each else each for each in values.tolist()],
-                )
-                for name, values in self._table.items()
-            )
-        )
+        units = {name: quantity_of(name).unit for name in self.parts.plan.names}
+        columns = []
+        for name, values in self._table.items():
+            cells = ["" if each != each else each for each in values.tolist()]
+            columns.append(Column(name, unit=units.get(name, ""), of=cells))
+        return Table(columns=tuple(columns))
 
 
 def study(
@@ -269,14 +263,16 @@ def study(
     files = files_of(case, declared)
     engine = partial(share_tasks, count=workers) if client is None else partial(on_cluster, client=client)
     deadline = time.monotonic() + (math.inf if stop_after is None else stop_after)
-    with locked_folder(Path(out), key=OUT):
-        parts = run_parts(Path(out), plan, files, engine, workers, deadline, part, progress)
+    resources = Resources(engine, workers, deadline, progress)
+    folder = Path(out)
+    with locked_folder(folder, key=OUT):
+        parts = run_parts(folder, plan, files, resources, part)
         found = Study(parts=parts, arm=arm.name, rows=space.count, rows_a_part=parts.rows)
         if found.is_complete:
-            indices = sobol_indices(parts, sobol, workers, engine, deadline, progress) if sobol else ()
-            found = replace(found, sobol=indices)
+            if sobol:
+                found = replace(found, sobol=sobol_indices(parts, sobol, resources))
             if order:
-                found = replace(found, worst=worst_arm(parts, found.table(), order, deadline))
+                found = replace(found, worst=worst_arm(parts, found.table(), order, resources))
     return found
 
 

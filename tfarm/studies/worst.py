@@ -22,6 +22,7 @@ from tfarm.schema import Quantity
 from tfarm.studies.quantities import STABLE
 from tfarm.studies.running import (
     OUT,
+    Resources,
     Row,
     StudyFolder,
     rows_of,
@@ -70,46 +71,56 @@ def badness(order: Sequence[str], values: Mapping[str, Any]) -> float:
         return beyond
     if value is None or math.isnan(value):
         return -math.inf
+    name = order[0]
     # of these by their size
-    size = abs(value) if any(name in order[0] for name in ("peak", "steady_state_error")) else value
-    is_larger_worse = any(name in order[0] for name in larger_is_worse)
-    return float(np.clip(size if is_larger_worse else -size, -beyond, beyond / 2))
+    if "peak" in name or "steady_state_error" in name:
+        value = abs(value)
+    if not any(each in name for each in larger_is_worse):
+        value = -value
+    return float(np.clip(value, -beyond, beyond / 2))
 
 
 def worst_arm(
-    parts: StudyFolder, table: Mapping[str, Any], order: Sequence[str], deadline: float
+    parts: StudyFolder, table: Mapping[str, Any], order: Sequence[str], resources: Resources
 ) -> WorstArm | None:
     """Return the worst arm in a quantity, of those drawn and of a search from the worst of them, and write its file.
 
-    `table` are the columns of the whole study.  None where the search has no end before the deadline [s].
+    `table` are the columns of the whole study.  None where the search has no end before the deadline.
     """
-    ranks = [badness(order, row) for row in rows_of({name: table[name].tolist() for name in order})]
+    rows = rows_of({name: table[name].tolist() for name in order})
+    ranks = [badness(order, row) for row in rows]
     first = int(np.argmax(ranks))
     require(ranks[first] > -math.inf, "worst", order[0], "no arm has a value of it")
     drawn = {name: of[first] for name, of in table.items()}
-    seen = search_worst(parts, order, first, deadline)
+    seen = search_worst(parts, order, first, resources)
     if seen is None:
         return None
     worst = max(seen or [drawn], key=partial(badness, order))
     numbers = {key: float(worst[key]) for key in parts.plan.space.keys}
-    values = (each[order[0]] for each in (drawn, worst))
-    of_drawn, of_worst = (None if each is None or math.isnan(each) else float(each) for each in values)
+    quantity = order[0]
     return WorstArm(
-        quantity=order[0],
+        quantity=quantity,
         row=first,
-        drawn=of_drawn,
-        found=of_worst,
+        drawn=_number_or_none(drawn[quantity]),
+        found=_number_or_none(worst[quantity]),
         evaluations=len(seen),
         numbers=numbers,
         file=str(write_case(parts, numbers)),
     )
 
 
-def search_worst(parts: StudyFolder, order: Sequence[str], first: int, deadline: float) -> list[Row] | None:
+def _number_or_none(value: float | None) -> float | None:
+    """Return a number, None of one that is missing."""
+    return None if value is None or math.isnan(value) else float(value)
+
+
+def search_worst(
+    parts: StudyFolder, order: Sequence[str], first: int, resources: Resources
+) -> list[Row] | None:
     """Return the rows of a search of the worst arm, by Nelder and Mead's simplex from row `first`.
 
     It stays within the range of a bounded distribution of n draws, else within its quantiles 1/(2 n) and 1 - 1/(2 n).
-    No rows without independent ranges; None where it has no end before the deadline [s].
+    No rows without independent ranges; None where it has no end before the deadline.
     """
     space = parts.plan.space
     if not space.is_independent:
@@ -132,7 +143,7 @@ def search_worst(parts: StudyFolder, order: Sequence[str], first: int, deadline:
             options={"maxfev": most, "initial_simplex": [start, *(start + steps)]},
         )
 
-    return search_rows(parts.others(f"_worst-{order[0]}-", most, 1, order), search, deadline)
+    return search_rows(parts.others(f"_worst-{order[0]}-", most, 1, order), search, resources)
 
 
 def write_case(parts: StudyFolder, numbers: Mapping[str, float]) -> Path:

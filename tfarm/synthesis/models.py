@@ -196,7 +196,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
     by_difference = "hub_rate" in signals and chain.converters.hub_rate == "difference"
     read = tuple(dict.fromkeys((*signals, *("hub_angle",) * by_difference)))
     sensed = sensed_plant(arm, chain, read, count)
-    pulse = PulseTransfer(sensed.together, chain.sampling).folded()
+    pulse = PulseTransfer(sensed.together, chain.sampling).without_fast_poles()
     A, B, C = pulse.matrices()
     own = sensed.own_moment(chain.sampling) if "root_moment" in signals else 0.0 * C[0]
     # of the two states of the rigid body those that the loop does not have; of an arm that turns the angle is the last

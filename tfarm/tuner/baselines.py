@@ -82,34 +82,40 @@ def best_constant(trial: Trial) -> BestConstant:
 def lq_bound(trial: Trial) -> Record:
     """Return the optimal trial; its K is zero, as it has no moment feedback, and its u is e."""
     model = trial.model
+    n = trial.n
     m = trial.reference.rigid
-    a = trial.numbers.T * trial.cost.a
-    b = trial.numbers.T * trial.cost.b
+    rest = trial.reference.rest
+    numbers = trial.numbers
+    a = numbers.T * numbers.a
+    b = numbers.T * numbers.b
     # of the states and 1: the last column of A is B r, the last entry of c is -m
     A = np.pad(model.A, (0, 1))
     B = np.r_[model.B, 0.0]
     c = np.r_[model.moment, 0.0]
     A[-1, -1] = 1.0
     P = np.zeros_like(A)
-    gains = np.zeros((trial.n, B.size))
+    gains = np.zeros((n, B.size))
     # e_k = -gains_k s, the last sample first
-    for k in reversed(range(trial.n)):
-        A[:-1, -1] = model.B * trial.reference.rest[k]
+    for k in reversed(range(n)):
+        A[:-1, -1] = model.B * rest[k]
         c[-1] = -m[k]
         PB = P @ B
-        if (weight := b + B @ PB) > 0:
-            gains[k] = A.T @ PB / weight
-        closed = A - np.outer(B, gains[k])
-        P = closed.T @ P @ closed + b * np.outer(gains[k], gains[k]) + a * np.outer(c, c)
+        gain = gains[k]
+        weight = b + B @ PB
+        if weight > 0:
+            gain[:] = A.T @ PB / weight
+        closed = A - np.outer(B, gain)
+        P = closed.T @ P @ closed + b * np.outer(gain, gain) + a * np.outer(c, c)
         P = (P + P.T) / 2
-    states = np.zeros((trial.n + 1, B.size - 1))
-    e = np.zeros(trial.n)
+    states = np.zeros((n + 1, B.size - 1))
+    e = np.zeros(n)
     for k, gain in enumerate(gains):
         e[k] = -gain[:-1] @ states[k] - gain[-1]
-        states[k + 1] = model.A @ states[k] + model.B * (e[k] + trial.reference.rest[k])
-    x = states[:-1] @ model.moment - m
+        states[k + 1] = model.A @ states[k] + model.B * (e[k] + rest[k])
+    at_samples = states[:-1]
+    x = at_samples @ model.moment - m
     cost = float((a * x @ x + b * e @ e) / 2)
-    return Record(trial.task.t, x, e, e, np.zeros(trial.n), states[:-1] @ model.own, cost, None)
+    return Record(trial.task.t, x, e, e, np.zeros(n), at_samples @ model.own, cost, None)
 
 
 def zero_vibration(z: complex) -> Real:
@@ -140,10 +146,11 @@ def shaper(loop: Sampled, kind: Shaper, modes: int = 2) -> Real:
     By default for those two that a slew excites most.
     """
     impulses = np.ones(1)
+    plant = loop.plant
     build = zero_vibration if kind == "ZV" else extra_insensitive
     poles: Any = loop.having(MOMENT_GAIN, 0.0).poles
     for mode in range(1, modes + 1):
-        own = loop.plant.poles[(loop.plant.mode == mode) & (loop.plant.poles.imag > 0)]
+        own = plant.poles[(plant.mode == mode) & (plant.poles.imag > 0)]
         upper = poles.z[(poles.mode == mode) & (poles.z.imag > 0)]
         if own.size and upper.size and own[0].imag * loop.chain.sampling.period < math.pi:
             impulses = np.convolve(impulses, build(complex(upper[0])))
@@ -261,9 +268,11 @@ def tried_loops(case: Case, quantised: Chain | None = None) -> list[NamedLoop]:
     sampling = replace(case.chain.sampling, delay_samples=delay + 1)
     late = f"one {'more ' * bool(delay)}sample of delay"
     # shares of the payload, or of the arm's mass: 0.1, 0.25 and 0.5 kg on the paper's
-    mass, masses = (
-        (arm.payload_mass, (0.5, 1.5, 2.0)) if arm.payload_mass else (arm.own_mass, (0.06, 0.15, 0.3))
-    )
+    mass = arm.own_mass
+    masses = (0.06, 0.15, 0.3)
+    if arm.payload_mass:
+        mass = arm.payload_mass
+        masses = (0.5, 1.5, 2.0)
     payloads = [float(f"{share * mass:.2g}") for share in masses]
     # by damping ratios of mode 1: 1e-5 and 1e-3 s on the paper's
     dampings = [float(f"{2 * zeta / first_frequency(arm):.1g}") for zeta in (3.575e-4, 3.575e-2)]
@@ -274,13 +283,14 @@ def tried_loops(case: Case, quantised: Chain | None = None) -> list[NamedLoop]:
         **{f"hub {share - 1:+.0%}": arm.having(hub_inertia=share * arm.hub_inertia) for share in (0.8, 1.2)},
         **{f"C = {C:g} s": arm.having(damping=C) for C in dampings},
     }
-    return [
-        NamedLoop("as trained", case),
-        NamedLoop("quantised", coarse),
-        NamedLoop(late, case.through(replace(case.chain, sampling=sampling))),
-        NamedLoop(f"quantised, {late}", coarse.through(replace(coarse.chain, sampling=sampling))),
-        *(NamedLoop(name, case.on(each)) for name, each in others.items()),
-    ]
+    cases = {
+        "as trained": case,
+        "quantised": coarse,
+        late: case.through(replace(case.chain, sampling=sampling)),
+        f"quantised, {late}": coarse.through(replace(coarse.chain, sampling=sampling)),
+        **{name: case.on(each) for name, each in others.items()},
+    }
+    return [NamedLoop(name, each) for name, each in cases.items()]
 
 
 def compare_controllers(

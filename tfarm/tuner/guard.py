@@ -264,16 +264,16 @@ def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
     must_be_known("guard", kind, get_args(GuardKind))
     if kind == "none":
         return Guard("none", 0.0, math.inf, loop.plant.count, False)
-    find, sector = (
-        (_frozen, "constant gain") if kind == "frozen" else (_moving, "sector of time-varying gains")
-    )
-    if guard := find(_larger(loop), best_constant):
+    find = _find_interval if kind == "frozen" else _find_sector
+    sector = "constant gain" if kind == "frozen" else "sector of time-varying gains"
+    guard = find(_larger(loop), best_constant)
+    if guard:
         return guard
     arm = loop.plant.arm
     gains = loop.gains
-    at = ", ".join(
-        f"{name} = {gains[name]:g}" for name in (RATE_GAIN, ANGLE_GAIN) if name == RATE_GAIN or gains[name]
-    )
+    at = f"{RATE_GAIN} = {gains[RATE_GAIN]:g}"
+    if gains[ANGLE_GAIN]:
+        at += f", {ANGLE_GAIN} = {gains[ANGLE_GAIN]:g}"
     start = f"{arm.name}: no {sector} is certified stable at {at}, C = {arm.damping:g} s"
     # the least damping with a guard, of a few [s]
     for C in filter(arm.damping.__lt__, np.geomspace(1e-12, 1e-2, 11).tolist()):
@@ -290,7 +290,7 @@ def constant_windows(loop: Sampled) -> list[tuple[float, float]]:
     return [(max(low, 0.0), min(high, 10.0)) for low, high in stable_windows(loop, MOMENT_GAIN) if high > 0]
 
 
-def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
+def _find_interval(loops: list[Sampled], best_constant: float) -> Guard | None:
     """The stability interval common to all models, without its outermost hundredth."""
     found = []
     for windows in map(constant_windows, loops):
@@ -302,14 +302,14 @@ def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
         )
     low = max(low for low, _ in found)
     high = min(high for _, high in found)
-    edge = (1 - RADIUS_SHARE) * (high - low)
-    is_wide = high - low >= NARROWEST_SECTOR
-    if is_wide:
+    width = high - low
+    edge = (1 - RADIUS_SHARE) * width
+    if width >= NARROWEST_SECTOR:
         return _guard("frozen", loops, found, low + edge * (low > 0), high - edge)
     return None
 
 
-def _moving(loops: list[Sampled], best_constant: float) -> Guard | None:
+def _find_sector(loops: list[Sampled], best_constant: float) -> Guard | None:
     """The sector of the default rule, certified in every model."""
     models = [MovingGain(loop) for loop in loops]
     m = _middle(models[0], best_constant)
@@ -317,7 +317,7 @@ def _moving(loops: list[Sampled], best_constant: float) -> Guard | None:
         return None
     half = RADIUS_SHARE * min(model.radius(m) for model in models)
     if half >= NARROWEST_SECTOR:
-        return _certified(models, max(0.0, m - half), m + half, m)
+        return _certify(models, max(0.0, m - half), m + half, m)
     return None
 
 
@@ -326,15 +326,16 @@ def sector_guard(loop: Sampled, lo: float, hi: float) -> Guard | None:
 
     None where it is not certified in every model of the loop.
     """
-    return _certified([MovingGain(each) for each in _larger(loop)], lo, hi, (lo + hi) / 2)
+    return _certify([MovingGain(each) for each in _larger(loop)], lo, hi, (lo + hi) / 2)
 
 
-def _certified(models: list[MovingGain], lo: float, hi: float, middle: float) -> Guard | None:
+def _certify(models: list[MovingGain], lo: float, hi: float, middle: float) -> Guard | None:
     """The sector [lo, hi] with its proof in every model; settled where the widest around `middle` is."""
     proven = tuple(filter(None, (model.proof(lo, hi) for model in models)))
     if len(proven) < len(models):
         return None
-    widest = [(middle - radius, middle + radius) for radius in (model.radius(middle) for model in models)]
+    radii = [model.radius(middle) for model in models]
+    widest = [(middle - radius, middle + radius) for radius in radii]
     return _guard("time-varying", [model.loop for model in models], widest, lo, hi, proven)
 
 
@@ -348,16 +349,16 @@ def _guard(
 ) -> Guard:
     """The guard [lo, hi] of the intervals `found` of some loops, the largest last."""
     omitted = not_covered(CONSUMER, loops[0].chain)
-    return Guard(kind, lo, hi, loops[-1].plant.count, _settled(loops, found), proofs, omitted)
+    return Guard(kind, lo, hi, loops[-1].plant.count, _is_settled(loops, found), proofs, omitted)
 
 
 def _middle(model: MovingGain, best_constant: float) -> float | None:
     """The middle gain of the default rule; None where no gain is stable."""
     # the best constant gain is within this share of half the width of the sector
     inside = 0.8
-    middles = [
-        float(m) for low, high in constant_windows(model.loop) for m in np.linspace(low, high, 62)[1:-1]
-    ]
+    middles: list[float] = []
+    for low, high in constant_windows(model.loop):
+        middles += np.linspace(low, high, 62)[1:-1].tolist()
     radii = np.array([model.radius(m) for m in middles])
     if not (radii > NARROWEST_SECTOR).any():
         return None
@@ -376,7 +377,7 @@ def _middle(model: MovingGain, best_constant: float) -> float | None:
     return inner
 
 
-def _settled(loops: list[Sampled], found: list[tuple[float, float]]) -> bool:
+def _is_settled(loops: list[Sampled], found: list[tuple[float, float]]) -> bool:
     """Whether more modes changed nothing, and the modes left out stay stable by their own damping.
 
     Never at C = 0.

@@ -175,10 +175,16 @@ class Trial:
         done = int(kernel.forward(self.setting(network, guard), network.weights, run, work))
         is_whole = done == self.n
         cost = float(kernel.trial_cost(done, self.numbers, run)) if is_whole else math.inf
-        t, x, u, e, K, moment = (
-            each[:done] for each in (self.task.t, run.x, run.u, run.e, run.K, run.moment)
+        return Record(
+            t=self.task.t[:done],
+            x=run.x[:done],
+            u=run.u[:done],
+            e=run.e[:done],
+            K=run.K[:done],
+            moment=run.moment[:done],
+            cost=cost,
+            stopped=None if is_whole else done,
         )
-        return Record(t, x, u, e, K, moment, cost, None if is_whole else done)
 
     def with_constant(self, K: float) -> Record:
         """The trial with a constant gain: a guard of one gain, for any network."""
@@ -340,10 +346,8 @@ class SavedTuner(StrictTable):
 
 def to_text(tuner: SavedTuner) -> str:
     """Text of a tuner's file; equal tuners give equal text, and it loads to the same bits."""
-    return (
-        json.dumps(tuner.model_dump(exclude_defaults=True), indent=1, allow_nan=False, ensure_ascii=False)
-        + "\n"
-    )
+    numbers = tuner.model_dump(exclude_defaults=True)
+    return json.dumps(numbers, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def save_tuner(tuner: SavedTuner, path: Path) -> None:

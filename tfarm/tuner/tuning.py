@@ -285,18 +285,9 @@ class TuningResult:
     ) -> Annotated[dict[str, Any], Quantity("plan", flat=True, help="options of learning, servo and cost")]:
         """Mode, rule, constants and seed of the learning, gains of the servo, and weights of the cost."""
         plan = self.tuning.plan
-        return {
-            "mode": plan.learning.mode,
-            "rule": plan.learning.rule,
-            "sensitivity": plan.learning.sensitivity,
-            "signals": plan.signals,
-            "seed": plan.seed,
-            "K1": plan.K1,
-            "Kp": plan.Kp,
-            "a": plan.cost.a,
-            "b": plan.cost.b,
-            "cost_unit_N_m": plan.scale,
-        }
+        found = {name: getattr(plan.learning, name) for name in ("mode", "rule", "sensitivity")}
+        found |= {name: getattr(plan, name) for name in ("signals", "seed", "K1", "Kp")}
+        return found | {"a": plan.cost.a, "b": plan.cost.b, "cost_unit_N_m": plan.scale}
 
     @property
     def trials(self) -> Annotated[int, Quantity("trials", help="slews of the training")]:
@@ -351,7 +342,8 @@ class TuningResult:
         self,
     ) -> Annotated[dict[str, Real], Quantity(help="moment gain K at the times t of the tuned slew")]:
         """The moment gain over time, tuned."""
-        return {"t": self.tuning.training.result.t, "K": self.tuning.training.result.K}
+        slew = self.tuning.training.result
+        return {"t": slew.t, "K": slew.K}
 
     @property
     def gain_range(
@@ -360,7 +352,7 @@ class TuningResult:
         tuple[float, float], Quantity("moment gain", digits=4, help="least and largest during the tuned slew")
     ]:
         """The least and the largest moment gain."""
-        K = self.gain["K"]
+        K = self.tuning.training.result.K
         return float(K.min()), float(K.max())
 
     @cached_property
