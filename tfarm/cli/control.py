@@ -323,7 +323,7 @@ def simulate(
 
 
 def matlab_signals(found: Any) -> dict[str, Any]:
-    """The signals of a run under names that MATLAB takes, strain_0_05 of strain@0.05; those between samples apart."""
+    """Return the signals of a run under MATLAB's names, strain_0_05 of strain@0.05; those between samples apart."""
     name = partial(re.sub, r"\W", "_")
     signals: dict[str, Any] = {name(key): values for key, values in found.signals.items() if len(values)}
     if found.between:

@@ -60,7 +60,7 @@ def discretise_law(law: Law, period: float) -> Law:
 
 
 def rule_in_words(law: Law) -> str:
-    """Discretisation of a law, in words."""
+    """Return the discretisation of a law, in words."""
     if law.is_discrete:
         return "in z, as given"
     names = {"tustin": "Tustin's rule", "zoh": "zero-order hold", "matched": "matched poles and zeros"}
@@ -68,7 +68,7 @@ def rule_in_words(law: Law) -> str:
 
 
 def _in_z(part: Part, law: Law, period: float) -> LawBlock:
-    """A block of the law in z."""
+    """Return a block of the law in z."""
     block = part.block
     rule = law.rule
     remedy = f"the rule {rule} is not for a law that differentiates: add a pole to den, or take tustin"
@@ -99,12 +99,12 @@ def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
 
 
 def prewarp_speed(period: float, prewarp: float) -> float:
-    """c [1/s] of s = c (z - 1)/(z + 1)."""
+    """Return c [1/s] of s = c (z - 1)/(z + 1)."""
     return prewarp / math.tan(prewarp * period / 2) if prewarp else 2 / period
 
 
 def by_scipy(block: LawBlock, period: float, rule: Literal["zoh", "bilinear"]) -> StateSpace:
-    """The block in z by a rule of `scipy.signal.cont2discrete`."""
+    """Return the block in z by a rule of `scipy.signal.cont2discrete`."""
     # here, because it takes a while to load
     from scipy.signal import cont2discrete
 
@@ -112,7 +112,7 @@ def by_scipy(block: LawBlock, period: float, rule: Literal["zoh", "bilinear"]) -
 
 
 def by_factors(block: Rational, rule: Literal["tustin", "matched"], period: float, c: float) -> Rational:
-    """The ratio in z of its exact factors; `matched` has at rest the same power of s and of (z - 1)/T."""
+    """Return the ratio in z of its exact factors; `matched` has at rest the same power of s and of (z - 1)/T."""
     poles, ((gain, zeros),) = block_factors(block, rule, period, c)
     return Rational.of_roots(1 + zeros, 1 + poles, gain)
 
@@ -121,7 +121,7 @@ def by_factors(block: Rational, rule: Literal["tustin", "matched"], period: floa
 
 
 def system_matrix(law: Law) -> Real:
-    """[A B; C D] of a law of all its columns, signals first."""
+    """Return [A B; C D] of a law of all its columns, signals first."""
     A, B, C, D = law.matrices((*law.signals, *law.wanted))
     return np.block([[A, B], [C, D]])
 
@@ -164,7 +164,7 @@ def in_single(law: Law) -> Law:
 
 
 def _single_block(block: LawBlock) -> LawBlock:
-    """A block in the numbers of float32; a constant gain remains one."""
+    """Return a block in the numbers of float32; a constant gain remains one."""
     with np.errstate(over="ignore"):
         matrices = [each.astype(np.float32).astype(float) for each in block.matrices()]
     remedy = (
@@ -178,7 +178,7 @@ def _single_block(block: LawBlock) -> LawBlock:
 
 
 def with_estimate(law: Law, chain: Chain) -> Law:
-    """The law in z, with the filtered difference of the encoder where the chain estimates the hub rate by it."""
+    """Return the law in z, with the filtered difference of the encoder where the chain estimates the hub rate by it."""
     if chain.converters.hub_rate != "difference" or "hub_rate" not in law.signals:
         return law
     T = chain.sampling.period
@@ -187,7 +187,7 @@ def with_estimate(law: Law, chain: Chain) -> Law:
 
 
 def _from_angle(part: Part, a: float, T: float) -> Part:
-    """A part of a law with its columns of the hub rate replaced by columns of the hub angle.
+    """Return a part of a law with its columns of the hub rate replaced by columns of the hub angle.
 
     x_{k+1} = a x_k + angle,  rate = (1 - a)/T (angle + (a - 1) x_k)
     """
@@ -241,7 +241,7 @@ class LawInZ:
         return [(part, row, gain, np.r_[zeros, others[part]]) for part, row, gain, zeros in self.columns]
 
     def ignores(self, turned: Real, weights: Sequence[float]) -> bool:
-        """Whether its output tends to 0 where its signals stay at these values (signals,)."""
+        """Return whether its output tends to 0 where its signals stay at these values (signals,)."""
         out = []
         for part, (poles, weight) in enumerate(zip(self.part_poles, weights, strict=True)):
             held, below = lowest_power(poles)
@@ -262,20 +262,21 @@ class LawInZ:
 
 
 def _cancel(terms: Sequence[float]) -> bool:
-    """Whether a sum over several signals is 0, to 1e-12 of its terms."""
+    """Return whether a sum over several signals is 0, to 1e-12 of its terms."""
     return abs(sum(terms)) <= 1e-12 * sum(map(abs, terms))
 
 
 def lowest_power(roots: Complex) -> tuple[int, float]:
-    """n and c of prod(delta - roots) = c delta^n + ..."""
+    """Return n and c of prod(delta - roots) = c delta^n + ..."""
     left = roots[roots != 0]
     return roots.size - left.size, float(np.prod(-left).real)
 
 
 def law_in_z(law: Law, acting: Law, chain: Chain) -> LawInZ:
-    """The parts of a law, and of the same in z (`acting`), at the period of a chain that may estimate the hub rate.
+    """Return the parts of a law, and of the same in z (`acting`), at the period of a chain.
 
-    The factors are those of the law itself; in float32 those of `acting`, whose numbers are rounded.
+    The chain may estimate the hub rate.  The factors are those of the law itself; in float32 those of `acting`, whose
+    numbers are rounded.
     """
     law = acting if chain.converters.is_single else law
     acting = with_estimate(acting, chain)
@@ -293,7 +294,7 @@ def law_in_z(law: Law, acting: Law, chain: Chain) -> LawInZ:
 
 
 def _factors(part: Part, law: Law, chain: Chain) -> tuple[Complex, list[tuple[str, float, Complex]]]:
-    """The poles of one part in z, and signal, gain and zeros of each column."""
+    """Return the poles of one part in z, and signal, gain and zeros of each column."""
     T = chain.sampling.period
     rule = "none" if law.is_discrete else law.rule
     poles, found = block_factors(part.block, rule, T, prewarp_speed(T, law.prewarp))
@@ -315,12 +316,12 @@ def _factors(part: Part, law: Law, chain: Chain) -> tuple[Complex, list[tuple[st
 
 
 def root_product(start: Complex, roots: Complex, more: Any = 0.0) -> Complex:
-    """prod(delta - roots) at delta = start + more (n,), without loss where a root is the start."""
+    """Return prod(delta - roots) at delta = start + more (n,), without loss where a root is the start."""
     return ((start[:, None] - roots) + np.reshape(more, (-1, 1))).prod(axis=1)
 
 
 def root_product_error(start: Complex, roots: Complex, more: Any) -> Real:
-    """Bound on the rounding error of that product; a root that is the start is exact."""
+    """Return a bound on the rounding error of that product; a root that is the start is exact."""
     # of each term of F: of its product of n factors they add up as the root of n
     roundings = 8
     away = start[:, None] - roots

@@ -61,17 +61,17 @@ class Plant:
     model: ModalModel
 
     def __call__(self, s: complex) -> Complex:
-        """G_o(s) of every output at one s."""
+        """Return G_o(s) of every output at one s."""
         return self.rigid @ np.array([1 / s**2, 1 / s]) + self.static + self.residues @ (1 / (s - self.poles))
 
     def rows(self, at: Sequence[int], names: tuple[str, ...]) -> Plant:
-        """The plant with these of its outputs, in this order, under these names."""
+        """Return the plant with these of its outputs, in this order, under these names."""
         return replace(
             self, outputs=names, residues=self.residues[at], rigid=self.rigid[at], static=self.static[at]
         )
 
     def join(self, more: Plant) -> Plant:
-        """The plant with the outputs of another of the same arm after its own; the other may lack the filter's pole."""
+        """Return the plant with the outputs of another of the same arm, which may lack the filter's pole."""
         # those of the arm, for any output
         assert np.array_equal(more.poles, self.poles[: more.poles.size])
         lacking = self.poles.size - more.poles.size
@@ -84,7 +84,7 @@ class Plant:
         )
 
     def with_poles(self, poles: Any, residues: Any) -> Plant:
-        """The plant with further poles, which are of no mode."""
+        """Return the plant with further poles, which are of no mode."""
         return replace(
             self,
             poles=np.r_[self.poles, poles],
@@ -116,9 +116,9 @@ class Plant:
 
 
 def arm_under_chain(arm: Arm, chain: Chain) -> tuple[Arm, Chain]:
-    """The arm that a chain drives, with the actuator's analog damping as friction of its hub, and the chain without it.
+    """Return the arm that a chain drives, and that chain without analog damping, which is friction of the arm's hub.
 
-    So it is in every loop of that arm once: in the sampled and in the continuous-time one.
+    So the damping is in every loop of that arm once: in the sampled and in the continuous-time one.
     """
     damping = chain.actuator.hub_damping
     remedy = "a hub without inertia has no model of finite order under it; give hub.inertia, or leave it out"
@@ -134,13 +134,13 @@ _modelled_once = lru_cache(maxsize=LISTS_KEPT)(modal_model)
 
 
 def undelayed_plant(arm: Arm, outputs: Sequence[str], count: int, x: float | None = None) -> Plant:
-    """The arm with `count` flexible modes, its outputs not filtered; `x` [m] is the place of outputs along the arm."""
+    """Return the arm with `count` flexible modes, its outputs not filtered; `x` [m] is that of outputs along it."""
     must_have_free_hub(arm)
     return with_modes(_modelled_once(arm, tuple(outputs), count, x, reach=OVERDAMPED), count)
 
 
 def with_modes(model: ModalModel, count: int) -> Plant:
-    """The plant with the first `count` modes of a model, and slow real poles for all others where C is large."""
+    """Return the plant with the first `count` modes of a model, and slow real poles for all others where C is large."""
     some = model.first(count)
     C = model.arm.damping
     poles = some.eigenvalues.ravel()
@@ -156,7 +156,7 @@ def with_modes(model: ModalModel, count: int) -> Plant:
 
 
 def is_analog(wanted: Output, chain: Chain) -> bool:
-    """Whether an output passes the analog anti-alias filter of a chain.
+    """Return whether an output passes the analog anti-alias filter of a chain.
 
     Strain, moment and shear, current, accelerations and rates do, as they leave analog amplifiers.  Angles and
     displacements do not, nor does the hub's rate where it is the difference of an encoder.
@@ -168,7 +168,7 @@ def is_analog(wanted: Output, chain: Chain) -> bool:
 
 
 def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:
-    """The plant with wc/(s + wc) after some outputs: a pole at -wc, with the residue wc G(-wc).
+    """Return the plant with wc/(s + wc) after some outputs: a pole at -wc, with the residue wc G(-wc).
 
     None of these has the double integral of the torque, as angles and displacements do (`is_analog`).
     """
@@ -179,7 +179,7 @@ def with_filter(plant: Plant, rows: Sequence[int], corner: float) -> Plant:
 
 
 def with_held_filter(plant: Plant, held: Real) -> Plant:
-    """The plant whose filters, its last pole, start from other values than 0: with the same pole once more.
+    """Return the plant whose filters, its last pole, start from other values than 0: with the same pole once more.
 
     An amplitude 1 of it is the excess `held` (outputs,) over the filtered outputs.  The torque drives both poles, and
     the shares of the second cancel.
@@ -196,7 +196,7 @@ Made = TypeVar("Made")
 
 
 def first_distinct(make: Callable[[Any], Made], candidates: Sequence[Any]) -> Made:
-    """What is made of the first of some candidates at which no two damped modes are one; the error of the last one."""
+    """Return the result of the first candidate at which no two damped modes are one; raise the error of the last."""
     *others, last = candidates
     for each in others:
         with suppress(ConvergenceError):

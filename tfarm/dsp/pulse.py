@@ -96,15 +96,15 @@ class PulseTransfer:
         return (1 - f) ** 2 * T * T / 2, f * (1 - f / 2) * T * T
 
     def __call__(self, z: ArrayLike) -> Complex:
-        """Values (outputs, *z.shape)."""
+        """Return the values (outputs, *z.shape)."""
         points = np.asarray(z, dtype=complex)
-        flat = self.scaled(points.ravel(), None, np.ones(points.size))
+        flat = self.scaled_values(points.ravel(), None, np.ones(points.size))
         return flat.reshape(len(self.plant.outputs), *points.shape)
 
-    def scaled(
+    def scaled_values(
         self, z: Complex, base: NDArray[np.int64] | None, offset: NDArray[Any], delta: Complex | None = None
     ) -> Complex:
-        """offset H(z) at z = multipliers[base] + offset, without loss for any offset: (outputs, n).
+        """Return offset H(z) at z = multipliers[base] + offset, without loss for any offset: (outputs, n).
 
         With no `base`, or one of -1, it is offset H(z); `delta` is z - 1, where that has more digits than z.
         """
@@ -127,7 +127,7 @@ class PulseTransfer:
         return self._sum_terms(np.positive, share, z, offset, distance)
 
     def sizes(self, base: NDArray[np.int64], offset: Complex, delta: Complex) -> Real:
-        """Sums (outputs, n) of the sizes of all terms of `scaled`, a bound on its rounding error in units of eps.
+        """Return the sums (outputs, n) of the sizes of all terms of `scaled_values`, a bound on its rounding in eps.
 
         The rounding of z itself is in them: it is |z - 1|/|z - pole| in the term of a pole.
         """
@@ -140,7 +140,7 @@ class PulseTransfer:
         return self._sum_terms(np.abs, share, z, abs(offset), distance)
 
     def _sum_terms(self, size: Callable[[Any], Any], share: Any, z: Any, offset: Any, distance: Any) -> Any:
-        """Return the terms of `scaled`, or their sizes.
+        """Return the terms of `scaled_values`, or their sizes.
 
         They are shares (n, poles) of r (early + late/z), static and rigid terms.
         """
@@ -178,11 +178,11 @@ class PulseTransfer:
     @property
     def integrals_at(self) -> int:
         """The index of the torque's two integrals among the states; the next state is the input of the last sample."""
-        upper, real = self.kept()
+        upper, real = self.pole_rows()
         return int(2 * upper.size + real.size)
 
     def matrices(self) -> tuple[Real, Real, Real]:
-        """A (n, n), B (n,), C (outputs, n) of x_{k+1} = A x_k + B u_k, y_k = C x_k, real.
+        """Return A (n, n), B (n,), C (outputs, n) of x_{k+1} = A x_k + B u_k, y_k = C x_k, real.
 
         States: real and imaginary part of the amplitude of each pole with Im p > 0, the amplitude of each real one, the
         double integral and the integral of the torque, and u_{k-1} to u_{k-d-1}.  For a hub that friction brings to
@@ -192,7 +192,7 @@ class PulseTransfer:
 
     @cached_property
     def _matrices(self) -> tuple[Real, Real, Real]:
-        upper, real = self.kept()
+        upper, real = self.pole_rows()
         plant = self.plant
         T = self.sampling.period
         d = self.sampling.whole_delay
@@ -238,13 +238,13 @@ class PulseTransfer:
         A[row, -1] = late**2 * phi(p * late) + np.expm1(p * late) / p * np.expm1(p * now) / p
         newest[row] = now**2 * phi(p * now)
 
-    def kept(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Indices of the poles with Im p > 0 and of the real ones, without s = 0."""
+    def pole_rows(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the indices of the poles with Im p > 0 and of the real ones, without s = 0."""
         p = self.plant.poles
         return np.nonzero(p.imag > 0)[0], np.nonzero(p.imag == 0)[0]
 
     def state_space(self) -> control.StateSpace:
-        """The same as a discrete `control.StateSpace` with dt = T and named signals, "moment@0_3" of moment@0.3."""
+        """Return a discrete `control.StateSpace` with dt = T and named signals, "moment@0_3" of moment@0.3."""
         import control
 
         A, B, C = self.matrices()
@@ -276,12 +276,12 @@ def pulse_transfer(
 
 
 def phi(u: float) -> float:
-    """(e^u - 1 - u)/u^2, by its series: |u| is below 0.1."""
+    """Return (e^u - 1 - u)/u^2, by its series: |u| is below 0.1."""
     # of 12 terms 0.1^12/14! is left
     return math.fsum(u**k / math.factorial(k + 2) for k in range(12))
 
 
 def held_amplitude(p: Complex, duration: float) -> Complex:
-    """(e^{p t} - 1)/p: the amplitude of a unit torque after `duration` t [s]."""
+    """Return (e^{p t} - 1)/p, the amplitude of a unit torque after `duration` t [s]."""
     safe = np.where(p * duration == 0, 1.0, p)
     return np.where(p * duration == 0, duration, np.expm1(p * duration) / safe)

@@ -53,13 +53,13 @@ class SensedPlant:
         return replace(whole.rows(at, read.names), arm=self.arm)
 
     def own_moment(self, sampling: Sampling) -> Real:
-        """The row of C that reads the arm's own root moment, one of the signals, ahead of the anti-alias filter."""
+        """Return the row of C of the arm's own root moment, one of the signals, ahead of the anti-alias filter."""
         alone = self.unfiltered.rows([self.read.names.index("root_moment")], ("root_moment",))
         pulse = PulseTransfer(self.together.join(alone), sampling).without_fast_poles()
         return pulse.matrices()[2][-1]
 
     def with_modes(self, count: int) -> SensedPlant:
-        """The same with another number of modes; cheap where the models have as many."""
+        """Return the same with another number of modes; cheap where the models have as many."""
         if count > self.plants[0].model.index.max(initial=0):
             return sensed_plant(self.arm, self.chain, self.read.names, count)
         return replace(self, plants=tuple(with_modes(each.model, count) for each in self.plants))

@@ -36,7 +36,7 @@ MOST_BETWEEN = 1000
 
 
 def quantisers(chain: Chain) -> Real:
-    """Step, lowest and highest value (3, 3) of a chain's encoder, strain amplifier and DAC, as `kernel` numbers them.
+    """Return step, lowest and highest value (3, 3) of a chain's encoder, strain amplifier and DAC, in `kernel`'s rows.
 
     A step of 0 is ideal; the torque's range also respects the motor's limit.
     """
@@ -73,7 +73,7 @@ class Measurement(NamedTuple):
     rigid_moment: float
 
     def servo(self, law: HubFeedback) -> float:
-        """Input [N m] of a law by the errors of the hub's angle and rate."""
+        """Return the input [N m] of a law by the errors of the hub's angle and rate."""
         angle_off = self.angle_reference - self.hub_angle
         rate_off = self.rate_reference - self.hub_rate
         return law[ANGLE_GAIN] * angle_off + law[RATE_GAIN] * rate_off
@@ -149,7 +149,7 @@ class Simulator:
         return self._run_law(law, gains)
 
     def _run_law(self, law: Law, gains: HubFeedback | None) -> Simulation:
-        """A law in z over the scenario, and its gains at the hub, if it is of these."""
+        """Simulate a law in z over the scenario; `gains` are its gains at the hub, if it is of these."""
         columns = (*law.signals, *law.wanted)
         kind = np.float32 if self.electronics.is_single else float
         table = system_matrix(law).astype(kind).astype(float)
@@ -176,7 +176,7 @@ class Simulator:
         return self._run_rule(torque, np.zeros(self.scenario.feedforward.size))
 
     def finer(self, between: int) -> Self:
-        """The same with `between` records in each sample."""
+        """Return the same with `between` records in each sample."""
         other = copy(self)
         other.between = between
         vars(other).pop("model", None)
@@ -191,7 +191,7 @@ class Simulator:
         return kernel.model_of(self.plant, self.kept, self.chain.sampling, self.between, row)
 
     def _run_rule(self, rule: Callable[[Measurement], tuple[float, float]], gain: Real | None) -> Simulation:
-        """The loop of `kernel.run_samples` in Python."""
+        """Simulate a rule from a measurement to a torque and a gain: the loop of `kernel.run_samples` in Python."""
         model = self.model
         state = self._start()
         memory = np.zeros(3)
@@ -246,13 +246,13 @@ class Simulator:
             self._first = np.r_[self._first, 1.0]
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
-        """Energy of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the residue of the hub rate, and rigid."""
+        """Return the energy of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the hub rate's residue, and rigid."""
         row = self.plant.outputs.index("hub_rate", len(self.measured))
         rigid = self.plant.rigid[row, 1] * rate**2 / 2
         return float(self.plant.residues[row, self.kept].real @ abs(amplitude) ** 2 + rigid)
 
     def _result(self, state: kernel.State, done: int, gain: Real | None) -> Simulation:
-        """The record of `done` samples."""
+        """Return the record of `done` samples."""
         stopped = None
         error = None
         plant = self.plant
@@ -291,7 +291,7 @@ class Simulator:
         )
 
     def _trace(self, t: Real, record: Real) -> Trace:
-        """The recorded outputs."""
+        """Return the recorded outputs."""
         angle, rate, moment, tip, *more = np.ascontiguousarray(record[:, len(self.measured) :].T)
         return Trace(t, angle, rate, moment, tip, dict(zip(self.others, more, strict=True)))
 

@@ -27,14 +27,14 @@ LEFT_OF_RECORD = 10
 
 
 def final_value(t: Real, y: Real) -> float:
-    """Mean of a signal (n,) over the last tenth of its record."""
+    """Return the mean of a signal (n,) over the last tenth of its record."""
     return float(y[LEFT_OF_RECORD * t >= (LEFT_OF_RECORD - 1) * t[-1]].mean())
 
 
 def settling_time(
     t: Real, away: Real, scale: float = 0.0, moves_until: float = 0.0, band: float = SETTLING_BAND
 ) -> float | None:
-    """Time [s] from the end of the motion after which deviations (n,) from the final value stay within a band.
+    """Return the time [s] after the motion from which deviations (n,) from the final value stay within a band.
 
     The band is a share of a scale, of the largest deviation where that is 0.  None where the deviation leaves it in the
     last tenth of the record.

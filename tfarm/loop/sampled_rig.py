@@ -97,7 +97,7 @@ class SampledRig:
             delta = start + offset
             at = np.where(is_of_law, -1, base)
             offset = np.where(is_of_law, 1.0, offset)
-        measured = self.pulse.scaled(z, at, offset, delta)
+        measured = self.pulse.scaled_values(z, at, offset, delta)
         rows = np.zeros((1 + len(self.in_z.part_poles), z.size), complex)
         rows[0] = offset * root_product(start, self.in_z.poles, more)
         for part, row, gain, zeros in self.in_z.terms:

@@ -165,7 +165,7 @@ class Assumptions:
 
 
 def assumptions(arm: Arm, count: int) -> Assumptions:
-    """Frequencies over the candidates of section and hub inertia.
+    """Return frequencies over the candidates of section and hub inertia.
 
     Raises ParameterError for a rig: the paper leaves section and hub of one beam open.
     """
@@ -181,7 +181,7 @@ def assumptions(arm: Arm, count: int) -> Assumptions:
 
 
 def has_hub_inertia(arm: Arm) -> bool:
-    """Whether the hub has an inertia that could be another: neither locked (inf) nor a free pin (0)."""
+    """Return whether the hub has an inertia that could be another: neither locked (inf) nor a free pin (0)."""
     return 0.0 < arm.hub.inertia < math.inf
 
 
@@ -271,7 +271,7 @@ def _candidates(
 
 
 def _with_own(candidates: Sequence[float], own: float) -> list[float]:
-    """The candidates and the arm's own value, ascending; one that equals it, but for rounding, is replaced."""
+    """Return the candidates and the arm's own value, ascending; one that equals it, but for rounding, is replaced."""
     return sorted([*(value for value in candidates if abs(value / own - 1) >= OWN_VALUE), own])
 
 
@@ -352,8 +352,8 @@ def tuner_numbers(arm: Arm, chain: Chain) -> TunerNumbers:
     return TunerNumbers(
         arm=arm,
         tuning=tuning,
-        slews=_simulated(tuning, trial.loop.chain),
-        coarse=_simulated(tuning, listed[late].case.chain),
+        slews=_simulate_both(tuning, trial.loop.chain),
+        coarse=_simulate_both(tuning, listed[late].case.chain),
         curves=learning_curves(arm, plan, own, curve_seeds(plan.trials * trial.n)),
         rows=tuple(rows),
     )
@@ -364,7 +364,7 @@ def curve_seeds(samples: int) -> int:
     return min(20, max(1, CURVE_SAMPLES // samples))
 
 
-def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
+def _simulate_both(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
     without, tuned = traces.resolve_simulations(
         tuning.trial.simulator(chain=chain),
         tuning.trial.arm,

@@ -244,7 +244,7 @@ def _poles() -> ColumnSource:
     return columns, values
 
 
-def _tuning() -> ColumnSource:
+def _tuner_costs() -> ColumnSource:
     """Return the costs of a tuning, and its end."""
     trial_cost = "tuner.trial_cost"
 
@@ -291,7 +291,7 @@ SOURCES: tuple[ColumnSource, ...] = (
     _damping_ratios(),
     _poles(),
     _step_of_both(),
-    _tuning(),
+    _tuner_costs(),
 )
 COLUMNS = {name: column for columns, _ in SOURCES for name, column in columns.items()}
 

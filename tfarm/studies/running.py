@@ -110,11 +110,13 @@ def table_of(plan: StudyPlan, first: int, rows: Real) -> Chunk:
         batch = rows[start : start + together].tolist()
         subjects = [_attempt(plan.subjects.at, row) for row in batch]
         _attempt(prepare, [each for each in subjects if isinstance(each, Subject)], plan.names)
-        for number, (row, subject) in enumerate(zip(batch, subjects, strict=True), start=first + start):
+        for number, (row, own) in enumerate(zip(batch, subjects, strict=True), start=first + start):
             found: dict[str, Any] = {ROW: number, **dict(zip(plan.space.keys, row, strict=True))}
-            own = _attempt(values_of, subject, plan.sources) if isinstance(subject, Subject) else subject
+            if isinstance(own, Subject):
+                own = _attempt(values_of, own, plan.sources)
             found |= {FAILED: own} if isinstance(own, str) else own
-            found[FAILED] = found[FAILED] and one_line(found[FAILED], 200)
+            reason = found[FAILED]
+            found[FAILED] = reason and one_line(reason, 200)
             for name, column in table.items():
                 column.append(found.get(name))
     return table
@@ -188,13 +190,13 @@ class StudyFolder:
     @property
     def is_complete(self) -> bool:
         """Whether every part is written."""
-        return len(self.written()) == self.count
+        return len(self.part_numbers()) == self.count
 
     def path(self, number: int) -> Path:
         """Return the file of a part."""
         return self.folder / f"{self.prefix}{self.digest[:8]}-{number:06}{self.suffix}"
 
-    def written(self) -> list[int]:
+    def part_numbers(self) -> list[int]:
         """Return the numbers of the parts that are there.  Raises ParameterError for a part of another study."""
         names = {each.name for each in self.folder.glob(f"{self.prefix}*")}
         found = [number for number in range(self.count) if self.path(number).name in names]
@@ -212,11 +214,12 @@ class StudyFolder:
         if self.suffix == PARQUET:
             module = parquet("out", "Parquet")
             arrow = importlib.import_module("pyarrow")
+            texts = self.plan.texts
+            columns = {}
+            for name, of in table.items():
+                columns[name] = arrow.array(of, arrow.string() if name in texts else arrow.float64())
             binary = io.BytesIO()
-            kinds = {name: arrow.string() if name in self.plan.texts else arrow.float64() for name in table}
-            module.write_table(
-                arrow.table({name: arrow.array(of, kinds[name]) for name, of in table.items()}), binary
-            )
+            module.write_table(arrow.table(columns), binary)
             content = binary.getvalue()
         else:
             stream = io.StringIO()
@@ -228,14 +231,14 @@ class StudyFolder:
 
     def column(self, *names: str) -> dict[str, Any]:
         """Return columns of all written rows in order: arrays of numbers, NaN where there is none, and of texts."""
-        tables = [self._read(self.path(number), names) for number in self.written()]
+        tables = [self._read_part(self.path(number), names) for number in self.part_numbers()]
         found = {}
         for name in names:
             columns = [table[name] for table in tables]
             found[name] = np.concatenate([np.empty(0), *columns])
         return found
 
-    def _read(self, path: Path, names: Sequence[str]) -> dict[str, Any]:
+    def _read_part(self, path: Path, names: Sequence[str]) -> dict[str, Any]:
         if self.suffix == PARQUET:
             table = parquet("out", str(path)).read_table(path, columns=list(names)).to_pydict()
         else:
@@ -304,7 +307,7 @@ def open_study(
     digest = hashlib.sha256(json.dumps([inputs, count]).encode()).hexdigest()
     parts = StudyFolder(folder, plan, digest, count, suffix, space.count)
     # is refused before a file is written
-    parts.written()
+    parts.part_numbers()
     if not file.exists():
         text = StudyRecord(inputs=inputs, rows_a_part=count).model_dump_json(indent=1)
         for each, content in {**files, name: f"{text}\n".encode()}.items():
@@ -357,7 +360,7 @@ def write_missing_parts(
     text: str,
 ) -> None:
     """Write the missing parts by the calls for their ranges of rows; after the deadline none is begun any more."""
-    done = parts.written()
+    done = parts.part_numbers()
     count = parts.count
     began = time.monotonic()
     missing = sorted({*range(count)} - {*done})
@@ -410,11 +413,8 @@ def check_rows(plan: StudyPlan, rows: Real) -> None:
         except ParameterError as error:
             errors[number] = error
     for number, first in errors.items():
-        raise ParameterError(
-            key=first.key,
-            value=first.value,
-            remedy=f"{len(errors)} of {len(rows)} arms are illegal, the first in row {number}: {first.remedy}",
-        )
+        remedy = f"{len(errors)} of {len(rows)} arms are illegal, the first in row {number}: {first.remedy}"
+        raise ParameterError(key=first.key, value=first.value, remedy=remedy)
 
 
 # ------------------------------------------------------------------------------------------------------------ cluster

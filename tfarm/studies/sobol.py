@@ -89,15 +89,7 @@ def _indices(name: str, keys: Sequence[str], values: Real) -> Iterator[SobolInde
         ends = found.bootstrap(confidence_level=CONFIDENCE)
     first = ends.first_order.confidence_interval
     total = ends.total_order.confidence_interval
-    columns = found.first_order, first.low, first.high, found.total_order, total.low, total.high
-    for key, S, S_low, S_high, T, T_low, T_high in zip(
-        keys, *(np.ravel(of).tolist() for of in columns), strict=True
-    ):
-        yield SobolIndex(
-            quantity=name,
-            key=key,
-            first=S,
-            first_interval=(S_low, S_high),
-            total=T,
-            total_interval=(T_low, T_high),
-        )
+    columns = (found.first_order, first.low, first.high, found.total_order, total.low, total.high)
+    rows = np.reshape(columns, (len(columns), -1)).T.tolist()
+    for key, (S, S_low, S_high, T, T_low, T_high) in zip(keys, rows, strict=True):
+        yield SobolIndex(name, key, S, (S_low, S_high), T, (T_low, T_high))

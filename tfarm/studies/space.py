@@ -113,7 +113,7 @@ class Space:
         return {key: each.frozen for key, each in self.over.items() if each.kind in GRIDS}
 
     @property
-    def drawn(self) -> tuple[str, ...]:
+    def drawn_keys(self) -> tuple[str, ...]:
         """Keys of distributions, then those of the posterior."""
         own = [key for key, each in self.over.items() if each.kind in FORMS]
         fitted = self.posterior.keys if self.posterior else ()
@@ -122,7 +122,7 @@ class Space:
     @property
     def keys(self) -> tuple[str, ...]:
         """Keys of the varied numbers, in the order of the columns."""
-        return (*(self.listing.columns if self.listing else ()), *self.drawn, *self.grids)
+        return (*(self.listing.columns if self.listing else ()), *self.drawn_keys, *self.grids)
 
     @cached_property
     def points(self) -> int:
@@ -135,14 +135,14 @@ class Space:
         rows = 1
         if self.listing:
             rows = self.listing.size
-        elif self.drawn:
+        elif self.drawn_keys:
             rows = self.draws
         return rows * self.points
 
     @property
     def is_independent(self) -> bool:
         """Whether the rows are independent draws: confidence needs that."""
-        return bool(self.drawn) and not (self.grids or self.listing)
+        return bool(self.drawn_keys) and not (self.grids or self.listing)
 
     def rows(self, first: int, last: int, listed: Real | None) -> Real:
         """Return rows first to last - 1 (rows, keys); `listed` are those of the list behind them."""
@@ -158,7 +158,7 @@ class Space:
         """Return the drawn values (rows, drawn) of uniform numbers (rows, drawn)."""
         fixed = {
             key: self.over[key].frozen.ppf(uniform[:, n])
-            for n, key in enumerate(self.drawn)
+            for n, key in enumerate(self.drawn_keys)
             if key in self.over
         }
         found = np.array([*fixed.values()]).reshape(len(fixed), len(uniform)).T
@@ -169,7 +169,7 @@ class Space:
     def uniform(self, n: int) -> Real:
         """Return the uniform numbers (drawn,) of draw n, in (0, 1)."""
         generator = np.random.Generator(np.random.Philox(key=self.seed, counter=n << 64))
-        return np.maximum(generator.random(len(self.drawn)), ENDS[0])
+        return np.maximum(generator.random(len(self.drawn_keys)), ENDS[0])
 
 
 def space_of(

@@ -119,7 +119,7 @@ def lq_bound(trial: Trial) -> Record:
 
 
 def zero_vibration(z: complex) -> Real:
-    """Impulses (n + 2,) of the shaper with zeros at z and its conjugate, 0 < arg z < pi."""
+    """Return the impulses (n + 2,) of the shaper with zeros at z and its conjugate, 0 < arg z < pi."""
     n = max(1, math.floor(math.pi / abs(np.angle(z)) * (1 + TIME_ROUNDING)))
     at = np.array([0, n, n + 1])
     powers = z ** (-at.astype(float))
@@ -130,7 +130,7 @@ def zero_vibration(z: complex) -> Real:
 
 
 def extra_insensitive(z: complex) -> Real:
-    """Impulses of two such shapers in a row, next to the frequency of z."""
+    """Return the impulses of two such shapers in a row, next to the frequency of z."""
     # V, the share of the vibration that is left at the mode itself, is that of its authors
     V = 0.05
     d = math.acos((1 - V) / (1 + V)) / math.pi
@@ -141,7 +141,7 @@ def extra_insensitive(z: complex) -> Real:
 
 
 def shaper(loop: Sampled, kind: Shaper, modes: int = 2) -> Real:
-    """Impulses for the first modes below half the sample rate, at the poles of the loop without moment feedback.
+    """Return the impulses for the first modes below half the sample rate, at poles without moment feedback.
 
     By default for those two that a slew excites most.
     """
@@ -158,7 +158,7 @@ def shaper(loop: Sampled, kind: Shaper, modes: int = 2) -> Real:
 
 
 def shape_scenario(task: Scenario, impulses: Real) -> Scenario:
-    """The scenario with every reference passed through the impulses; its slew ends later by their length."""
+    """Return the scenario with every reference passed through the impulses; its slew ends later by their length."""
     names = ("feedforward", "hub_angle", "hub_rate", "rigid_moment")
     through: dict[str, Any] = {
         name: np.convolve(getattr(task, name), impulses)[: task.t.size] for name in names
@@ -191,7 +191,7 @@ class Outcome(NamedTuple):
     tip_error: Annotated[float | None, Quantity(help="tip error at the end [m]")]
 
     def as_text(self, digits: int) -> str:
-        """The cost."""
+        """Return the cost."""
         return f"{self.cost:.{digits}g}"
 
 
@@ -239,7 +239,7 @@ class NamedLoop(NamedTuple):
 
 
 def quantised_chain(arm: Arm, chain: Chain) -> Chain:
-    """The chain with its own converters; ideal ones are replaced by 12 bits over ranges for the arm's slew.
+    """Return the chain with its own converters; ideal ones are replaced by 12 bits over ranges for the arm's slew.
 
     These are 20 N m of moment and 10 N m of torque on the paper's arm, in the unit of torque of any other.
     """
@@ -326,19 +326,19 @@ def compare_controllers(
 
 
 def _proven(here: Trial, guard: Guard) -> bool:
-    """Whether the sector is certified for this loop, with the trial's modes."""
+    """Return whether the sector is certified for this loop, with the trial's modes."""
     with suppress(ConvergenceError):
         return not here.arm.is_undamped and MovingGain(here.loop).proof(guard.lo, guard.hi) is not None
     return False
 
 
 def _constant(trial: Trial, K: float) -> Outcome:
-    """The outcome of a constant gain."""
+    """Return the outcome of a constant gain."""
     return _outcome(trial.simulator().linear(trial.loop.gains.having(MOMENT_GAIN, K)), trial)
 
 
 def _outcome(run: Simulation, trial: Trial) -> Outcome:
-    """The outcome of a simulation, by the cost of a trial."""
+    """Return the outcome of a simulation, by the cost of a trial."""
     return Outcome(
         record_of_simulation(run, trial.cost, trial.signals).cost, run.residual_moment, tip_off(run, trial)
     )

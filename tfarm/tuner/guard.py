@@ -74,7 +74,7 @@ class CommonLyapunov:
     contraction: float
 
     def is_proven(self) -> bool:
-        """Whether P > 0 and both inequalities hold in exact arithmetic.
+        """Return whether P > 0 and both inequalities hold in exact arithmetic.
 
         In the states 2^k s, k whole and such that P has diagonal entries near 1: P has all its digits in any units, and
         nothing is rounded by the change of units, as powers of two are exact.
@@ -136,7 +136,7 @@ class MovingGain:
         return self.loop.having(MOMENT_GAIN, 0.0).reduced_matrix()
 
     @cached_property
-    def _fed_back(self) -> Real:
+    def _feedback(self) -> Real:
         """drive sense^T: the change of the matrix by a gain of -1."""
         return self.open - self.loop.having(MOMENT_GAIN, 1.0).reduced_matrix()
 
@@ -145,20 +145,20 @@ class MovingGain:
         """(n,): the row of the moment."""
         # of the torque: its drive is 1
         return np.asarray(
-            self._fed_back[self.loop.pulse.integrals_at + 2 - len(self.loop.matrix()) + len(self.open)]
+            self._feedback[self.loop.pulse.integrals_at + 2 - len(self.loop.matrix()) + len(self.open)]
         )
 
     @cached_property
     def drive(self) -> Real:
         """(n,): the column of the torque."""
-        return np.asarray(self._fed_back @ self.sense / (self.sense @ self.sense))
+        return np.asarray(self._feedback @ self.sense / (self.sense @ self.sense))
 
     def at(self, K: float) -> Real:
-        """The closed-loop matrix at a gain."""
-        return self.open - K * self._fed_back
+        """Return the closed-loop matrix at a gain."""
+        return self.open - K * self._feedback
 
     def radius(self, m: float) -> float:
-        """Half the width of the widest sector around m; 0 where m itself is unstable."""
+        """Return half the width of the widest sector around m; 0 where m itself is unstable."""
         w, V = np.linalg.eig(self.at(m))
         if not abs(w).max() < 1.0:
             return 0.0
@@ -166,7 +166,7 @@ class MovingGain:
         return float(1.0 / _peak(r, w))
 
     def proof(self, lo: float, hi: float) -> CommonLyapunov | None:
-        """The Lyapunov function of [lo, hi], proven in exact arithmetic; None where there is none."""
+        """Return the Lyapunov function of [lo, hi], proven in exact arithmetic; None where there is none."""
         half = (hi - lo) / 2
         found = common_lyapunov(
             self.at((lo + hi) / 2),
@@ -179,7 +179,7 @@ class MovingGain:
 
 
 def _peak(residues: NDArray[np.complexfloating], poles: NDArray[np.complexfloating]) -> float:
-    """max over the unit circle of |sum of residues/(z - poles)|."""
+    """Return max over the unit circle of |sum of residues/(z - poles)|."""
     # points around the angle of each pole, whose distance from the circle is known to 1e-12
     away = np.geomspace(0.01, 100.0, 30)
     width = np.maximum(1 - abs(poles), 1e-12)[:, None] * np.r_[-away, 0.0, away]
@@ -286,12 +286,12 @@ def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
 
 
 def constant_windows(loop: Sampled) -> list[tuple[float, float]]:
-    """The stability intervals of constant gains K >= 0, up to 10."""
+    """Return the stability intervals of constant gains K >= 0, up to 10."""
     return [(max(low, 0.0), min(high, 10.0)) for low, high in stable_windows(loop, MOMENT_GAIN) if high > 0]
 
 
 def _find_interval(loops: list[Sampled], best_constant: float) -> Guard | None:
-    """The stability interval common to all models, without its outermost hundredth."""
+    """Return the stability interval common to all models, without its outermost hundredth."""
     found = []
     for windows in map(constant_windows, loops):
         if not windows:
@@ -310,7 +310,7 @@ def _find_interval(loops: list[Sampled], best_constant: float) -> Guard | None:
 
 
 def _find_sector(loops: list[Sampled], best_constant: float) -> Guard | None:
-    """The sector of the default rule, certified in every model."""
+    """Return the sector of the default rule, certified in every model."""
     models = [MovingGain(loop) for loop in loops]
     m = _middle(models[0], best_constant)
     if m is None:
@@ -330,7 +330,7 @@ def sector_guard(loop: Sampled, lo: float, hi: float) -> Guard | None:
 
 
 def _certify(models: list[MovingGain], lo: float, hi: float, middle: float) -> Guard | None:
-    """The sector [lo, hi] with its proof in every model; settled where the widest around `middle` is."""
+    """Return the sector [lo, hi] with its proof in every model; settled where the widest around `middle` is."""
     proven = tuple(filter(None, (model.proof(lo, hi) for model in models)))
     if len(proven) < len(models):
         return None
@@ -347,13 +347,13 @@ def _guard(
     hi: float,
     proofs: tuple[CommonLyapunov, ...] = (),
 ) -> Guard:
-    """The guard [lo, hi] of the intervals `found` of some loops, the largest last."""
+    """Return the guard [lo, hi] of the intervals `found` of some loops, the largest last."""
     omitted = not_covered(CONSUMER, loops[0].chain)
     return Guard(kind, lo, hi, loops[-1].plant.count, _is_settled(loops, found), proofs, omitted)
 
 
 def _middle(model: MovingGain, best_constant: float) -> float | None:
-    """The middle gain of the default rule; None where no gain is stable."""
+    """Return the middle gain of the default rule; None where no gain is stable."""
     # the best constant gain is within this share of half the width of the sector
     inside = 0.8
     middles: list[float] = []
@@ -378,7 +378,7 @@ def _middle(model: MovingGain, best_constant: float) -> float | None:
 
 
 def _is_settled(loops: list[Sampled], found: list[tuple[float, float]]) -> bool:
-    """Whether more modes changed nothing, and the modes left out stay stable by their own damping.
+    """Return whether more modes changed nothing, and the modes left out stay stable by their own damping.
 
     Never at C = 0.
     """
@@ -391,7 +391,7 @@ def _is_settled(loops: list[Sampled], found: list[tuple[float, float]]) -> bool:
 
 
 def upper_modes_are_quiet(loop: Sampled, highest: float) -> bool:
-    """Whether the own decay of the upper half of the modes exceeds the bound on the push of the feedback."""
+    """Return whether the own decay of the upper half of the modes exceeds the bound on the push of the feedback."""
     plant = loop.plant
     T = loop.chain.sampling.period
     fed_back = loop.having(MOMENT_GAIN, highest).push
@@ -401,7 +401,7 @@ def upper_modes_are_quiet(loop: Sampled, highest: float) -> bool:
 
 
 def _larger(loop: Sampled) -> list[Sampled]:
-    """The loop, and the same with four times the modes, or three times or twice; at C = 0 with twenty.
+    """Return the loop, and the same with four times the modes, or three times or twice; at C = 0 with twenty.
 
     A number at which two of the damped modes are not distinguished is left out.
     """

@@ -142,7 +142,7 @@ class Trial:
         )
 
     def setting(self, network: Network, guard: kernel.Limits) -> kernel.Setting:
-        """Arguments of the compiled loops, without weights."""
+        """Return the arguments of the compiled loops, without weights."""
         return kernel.Setting(self.model, self.reference, self.numbers, network.scales, guard)
 
     @property
@@ -151,16 +151,16 @@ class Trial:
         return Case(self.arm, self.loop.gains, self.loop.chain)
 
     def on(self, case: Case) -> Trial:
-        """The same slew in another case, with the references of this one's arm."""
+        """Return the same slew in another case, with the references of this one's arm."""
         return replace(self, loop=sampled_loop(case, count=self.loop.plant.count))
 
     def simulator(self, chain: Chain | None = None) -> Simulator:
-        """A simulator of the loop, with the converters of a chain, by default that of the trial."""
+        """Return a simulator of the loop, with the converters of a chain, by default that of the trial."""
         case = self.case if chain is None else self.case.through(chain)
         return Simulator(case, self.task, count=self.loop.plant.count)
 
     def room(self, network: Network) -> tuple[kernel.TrialSignals, kernel.SampleBuffers]:
-        """Empty record and buffers of a trial with that network."""
+        """Return an empty record and buffers of a trial with that network."""
         hidden, inputs = network.W1.shape
         n = self.n
         states = self.model.B.size
@@ -170,7 +170,7 @@ class Trial:
     # ------------------------------------------------------------ one trial
 
     def with_network(self, network: Network, guard: kernel.Limits) -> Record:
-        """The trial with a fixed network; the cost is inf where it was stopped."""
+        """Return the trial with a fixed network; the cost is inf where it was stopped."""
         run, work = self.room(network)
         done = int(kernel.forward(self.setting(network, guard), network.weights, run, work))
         is_whole = done == self.n
@@ -187,7 +187,7 @@ class Trial:
         )
 
     def with_constant(self, K: float) -> Record:
-        """The trial with a constant gain: a guard of one gain, for any network."""
+        """Return the trial with a constant gain: a guard of one gain, for any network."""
         silent = Network(np.zeros((1, PAPER_INPUTS)), np.zeros(1), np.ones(PAPER_INPUTS))
         return self.with_network(silent, kernel.Limits(K, K))
 
@@ -234,7 +234,7 @@ def usual_rate_gain(arm: Arm, Kp: float) -> float:
 
 
 def with_signals(chain: Chain, signals: MomentReading) -> Chain:
-    """The chain with that reading of the moment during the slew."""
+    """Return the chain with that reading of the moment during the slew."""
     return replace(chain, slew=replace(chain.slew, reading=signals))
 
 
@@ -267,7 +267,7 @@ class TunedGain:
         return simulator.gain_schedule(self.servo.K1, self, Kp=self.servo.Kp)
 
     def __call__(self, m: Measurement) -> float:
-        """The gain at this sample."""
+        """Return the gain at this sample."""
         if m.k == 0:
             self._past = (0.0,) * 5
         u1, e1, x1, K1, e2 = self._past
@@ -296,7 +296,7 @@ def record_of_simulation(simulation: Simulation, cost: Cost, signals: MomentRead
 
 
 def tip_off(simulation: Simulation, trial: Trial) -> float | None:
-    """Distance of the tip from its target [m] at the end of a simulated slew; None of an unstable loop."""
+    """Return the distance of the tip from its target [m] at the end of a simulated slew; None of an unstable loop."""
     if simulation.stopped is not None:
         return None
     travel = trial.loop.chain.slew.travel_of(trial.arm.reach)
@@ -334,7 +334,7 @@ class SavedTuner(StrictTable):
         return Network(np.array(self.W1), np.array(self.w2), np.array(self.scales))
 
     def gain(self) -> TunedGain:
-        """The controller.  Raises ParameterError where the parts of the tuner do not match."""
+        """Return the controller.  Raises ParameterError where the parts of the tuner do not match."""
         is_free = self.guard_kind == "none"
         require(
             (self.guard is None) == is_free, "guard", self.guard, "two ends, or null with guard_kind none"
@@ -345,7 +345,7 @@ class SavedTuner(StrictTable):
 
 
 def to_text(tuner: SavedTuner) -> str:
-    """Text of a tuner's file; equal tuners give equal text, and it loads to the same bits."""
+    """Return the text of a tuner's file; equal tuners give equal text, and it loads to the same bits."""
     numbers = tuner.model_dump(exclude_defaults=True)
     return json.dumps(numbers, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 

@@ -77,7 +77,7 @@ class Plan:
         check_annotated(self, "")
 
     def trial(self, arm: Arm, chain: Chain | None) -> Trial:
-        """The trial on an arm, with the weights of the cost on moments and torques in units of the scale."""
+        """Return the trial on an arm, with the weights of the cost on moments and torques in units of the scale."""
         return slew_trial(
             arm,
             chain,
@@ -90,7 +90,7 @@ class Plan:
         )
 
     def network(self, seed: int) -> Network:
-        """The network with the first weights of a seed."""
+        """Return the network with the first weights of a seed."""
         return initial_network(
             seed,
             hidden=self.hidden,
@@ -121,7 +121,7 @@ class Tuning:
         return "cost {:.6g}; {:.6g} with the best constant gain, {:.6g} without".format(*costs)
 
     def saved(self) -> SavedTuner:
-        """The record that `save_tuner` writes."""
+        """Return the record that `save_tuner` writes."""
         guard = self.training.guard
         plan = self.plan
         network = self.training.network
@@ -142,7 +142,7 @@ class Tuning:
         )
 
     def gain(self) -> TunedGain:
-        """The trained controller."""
+        """Return the trained controller."""
         return self.saved().gain()
 
     @property
@@ -250,7 +250,7 @@ class SlewEnd(NamedTuple):
 
     @classmethod
     def of(cls, tuning: Tuning) -> SlewEnd:
-        """The end of the trial of a tuning."""
+        """Return the end of the trial of a tuning."""
         simulator = tuning.trial.simulator()
         gain = tuning.gain()
         runs = gain.run(simulator), simulator.linear(tuning.constant), simulator.linear(gain.servo)
