@@ -225,7 +225,11 @@ def bode(
     subject = load_arm(arm, under.keywords["theory"], driven)
     (wanted,), x = along(["root_moment" if output is None else output])
     low, high = resonant_band(tfarm.transfer(subject, wanted, x=x, input=driven).arm)
-    band = low if start is None else start, high if stop is None else stop
+    if start is not None:
+        low = start
+    if stop is not None:
+        high = stop
+    band = (low, high)
     check_range(*band)
     show(tfarm.bode(subject, wanted, band, x=x, input=driven))
 

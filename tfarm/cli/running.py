@@ -6,7 +6,7 @@ import sys
 import tomllib
 from difflib import get_close_matches
 from functools import cache
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -176,10 +176,9 @@ def usage(error: Any) -> str:
     text = error.format_message()
     if text.startswith("No such option"):
         name = error.option_name
-        known = [option for each in error.ctx.command.params for option in each.opts]
-        meant = [
-            option for option, others in hints()["options"].items() if name in others and option in known
-        ]
+        known = [*chain.from_iterable(each.opts for each in error.ctx.command.params)]
+        alike = [option for option, others in hints()["options"].items() if name in others]
+        meant = [option for option in alike if option in known]
         if meant:
             return f"No such option: {name}. Did you mean {' or '.join(meant)}?"
         return text + hints()["other_commands"].get(name, "")

@@ -293,7 +293,7 @@ SOURCES: tuple[ColumnSource, ...] = (
     _step_of_both(),
     _tuner_costs(),
 )
-COLUMNS = {name: column for columns, _ in SOURCES for name, column in columns.items()}
+COLUMNS = dict(chain.from_iterable(columns.items() for columns, _ in SOURCES))
 
 
 def column_names(words: Sequence[str]) -> tuple[str, ...]:
@@ -337,7 +337,8 @@ def sources_of(names: Sequence[str]) -> list[tuple[Set[str], Values]]:
     found = list[tuple[Set[str], Values]]()
     for columns, values in SOURCES:
         own = dict.fromkeys(name for name in names if first_of(name) in columns)
-        found += [(own.keys(), values)] * bool(own)
+        if own:
+            found.append((own.keys(), values))
     return found
 
 

@@ -47,13 +47,16 @@ FORMS: dict[str, tuple[str, Callable[..., Any]]] = {
     "normal": ("MEAN, DEVIATION", lambda mean, deviation: scipy.stats.norm(mean, deviation)),
     "lognormal": ("MEDIAN, DEVIATION of ln", lambda median, s: scipy.stats.lognorm(s, scale=median)),
 }
+
+
+def grid_points(low: float, high: float, count: float) -> list[float]:
+    """Return the points of a grid; none where its ends or their number are none of one."""
+    is_grid = low < high and count % 1 == 0 < count <= MOST_ROWS
+    return np.linspace(low, high, int(count)).tolist() if is_grid else []
+
+
 GRIDS: dict[str, tuple[str, Callable[..., Any]]] = {
-    "grid": (
-        "LOW, HIGH, COUNT",
-        lambda low, high, count: (
-            low < high and count % 1 == 0 < count <= MOST_ROWS and np.linspace(low, high, int(count)).tolist()
-        ),
-    ),
+    "grid": ("LOW, HIGH, COUNT", grid_points),
     "values": ("at least one number", lambda *values: values),
 }
 KINDS = {**FORMS, **GRIDS}
@@ -220,7 +223,7 @@ def _distribution(place: str, entry: Any) -> Distribution:
     with suppress(TypeError), np.errstate(all="ignore"):
         found = Distribution(kind, tuple(number(place, each, remedy) for each in numbers))
         points = found.frozen.ppf(ENDS) if kind in FORMS else found.frozen
-        is_finite = points is not False and len(points) > 0 and bool(np.isfinite(points).all())
+        is_finite = len(points) > 0 and bool(np.isfinite(points).all())
     require(is_finite, place, numbers, remedy)
     return found
 
@@ -241,12 +244,11 @@ class Subjects:
     def __init__(self, case: Case, keys: Sequence[str], fitted: Collection[str] = ()) -> None:
         self.case = case
         self.keys = keys
-        numbers = {
-            f"{table}.{each.name}": (table, each.name)
-            for table in CHAIN_TABLES
-            for each in fields(getattr(case.chain, table))
-            if float in (each.type, *get_args(each.type))
-        }
+        numbers: dict[str, tuple[str, str]] = {}
+        for table in CHAIN_TABLES:
+            for each in fields(getattr(case.chain, table)):
+                if float in (each.type, *get_args(each.type)):
+                    numbers[f"{table}.{each.name}"] = (table, each.name)
         self._of_chain = {key: numbers[key] for key in keys if key in numbers}
         self._of_law = _names_after("law.", keys)
         signals = []
