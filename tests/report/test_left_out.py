@@ -17,7 +17,7 @@ from tests.hostile import NAME, TEXT, check_drawing, check_page
 from tests.report.written import ANCHORS, ARM, HELD, Links, Unmakeable, files_of, links_of, plain_cards
 from tests.shell import refused, run
 from tfarm.arm import to_toml
-from tfarm.cli import app as cli_app
+from tfarm.cli.progress import progress
 from tfarm.dsp import Chain, load_chain
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import fit
@@ -211,9 +211,8 @@ def test_the_folder_of_an_arm_is_small(pages):
     assert of_phones < 2e6
 
 
-def test_progress_is_a_line_in_a_pipe_too(monkeypatch, capsys):
-    monkeypatch.setattr(cli_app, "PROGRESS_AFTER", 0.02)
-    with cli_app.progress() as advance:
+def test_progress_is_a_line_in_a_pipe_too(capsys):
+    with progress(0.02) as advance:
         advance(3, 7, "a section")
         deadline = time.monotonic() + 30
         seen = ""

@@ -25,7 +25,8 @@ from tfarm.report.writing import write_study
 from tfarm.response.transfer import transfer
 from tfarm.schema import json_value, text, to_dict
 from tfarm.schema.terminal import show
-from tfarm.studies.study import SobolIndex, WorstArm
+from tfarm.studies.sobol import SobolIndex
+from tfarm.studies.worst import WorstArm
 
 COMMAND = ("study", "sasaki2012-lab", "--over", "payload.mass=uniform:0,0.2", "--over", "hub.inertia=uniform:0.05,0.2")
 WORST = WorstArm(
@@ -240,7 +241,7 @@ def test_a_band_has_the_curves_of_the_arms(found):
 
 
 def test_an_arm_without_a_response_is_left_out_and_none_at_all_is_an_error(found):
-    refused, place = tfarm.ConvergenceError("no", None, None), "tfarm.studies.quantities.transfer"
+    refused, place = tfarm.ConvergenceError("no", None, None), "tfarm.studies.findings.transfer"
     ready = transfer(found.parts.plan.case.arm, "root_moment")
     with mock.patch(place, side_effect=[ready, *[refused] * (DRAWS - 1), lambda s: 0 * s + 10]):
         (line, *_) = study_band.figure(found).axes[0].lines

@@ -15,14 +15,8 @@ from tfarm.exact.outputs import signal_words, unit_over
 from tfarm.plots.frequency import over_frequency
 from tfarm.plots.motion import OF_STABILITY
 from tfarm.plots.style import BLUE, GREY, INK, Axes, number_label, picture, plain_ticks, safe
-from tfarm.studies.quantities import (
-    COLUMNS,
-    Spread,
-    column_names,
-    loop_of,
-    quantity_of,
-    stability_of,
-)
+from tfarm.studies.findings import Spread
+from tfarm.studies.quantities import COLUMNS, column_names, loop_of, quantity_of, stability_of
 from tfarm.studies.study import Study
 
 # axes of distributions side by side, and in all

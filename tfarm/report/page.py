@@ -34,6 +34,7 @@ from tfarm.audit.published import PublishedRow, validate
 from tfarm.case import Case, OfCase
 from tfarm.dsp import Chain, Simulation, load_chain, results, traces
 from tfarm.dsp.discretise import acting_law
+from tfarm.dsp.scenarios import TRIAL_SLEWS
 from tfarm.errors import ConvergenceError, ParameterError, one_line
 from tfarm.exported.live_loop import LiveNumbers, live_data
 from tfarm.fitting.data import Measured
@@ -195,7 +196,7 @@ class PageCase(OfCase):
     @property
     def slew(self) -> Simulation:
         """The slew of the sampled loop, with the records that a picture needs."""
-        duration = traces.RECORD_LENGTH * self.chain.slew.rise_time
+        duration = TRIAL_SLEWS * self.chain.slew.rise_time
         return results.simulate_for_picture(self.case, "slew", duration)
 
     def film(self, run: Simulation) -> traces.Motion:
