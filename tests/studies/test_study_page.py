@@ -217,9 +217,8 @@ def test_each_arm_is_one_mark_in_the_colour_of_its_loop(found):
         assert sum(len(line.get_xdata()) for line in edge) == (~np.isfinite(y)).sum()
 
 
-def test_of_many_arms_some_are_drawn(found, monkeypatch):
-    monkeypatch.setattr("tfarm.plots.studies.MOST_MARKS", 10)
-    ax = study_scatter.figure(found, "least_damping").axes[0]
+def test_of_many_arms_some_are_drawn(found):
+    ax = study_scatter.figure(found, "least_damping", most=10).axes[0]
     assert sum(len(line.get_xdata()) for line in ax.lines) == 10
 
 

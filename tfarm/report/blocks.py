@@ -21,7 +21,8 @@ import tfarm
 from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, load, presets
 from tfarm.assessment.card import LoopCard
 from tfarm.digits import how_many, join_words, kept_digits, plain, scientific, significant
-from tfarm.plots.style import Figure, drawn_for, save_figure
+from tfarm.plots.files import save_figure
+from tfarm.plots.style import Figure, drawn_for
 from tfarm.schema import Column, Table, quantities, save_table, text, to_json
 from tfarm.schema.html import as_html, with_symbols
 

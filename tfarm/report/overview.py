@@ -9,8 +9,8 @@ from typing import Any
 
 from tfarm.assessment.card import ResultCard
 from tfarm.errors import TfarmError
+from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import draw_card
-from tfarm.plots.style import save_figure
 from tfarm.report.blocks import PICTURES, PageSection, SavedBlock, keep, prose
 from tfarm.report.page import ArmReport
 from tfarm.schema import table, text, to_dict

@@ -50,7 +50,7 @@ from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.loop.sampled_modes import STRONGER, SampledLoci, sampled_loci
 from tfarm.loop.sampled_verdict import Analysis, SampledBrief, Verdict, sampled_brief, sampled_verdict
 from tfarm.loop.stability import Spill, spill
-from tfarm.plots.style import gains_words
+from tfarm.plots.labels import gains_words
 from tfarm.records import frozen
 from tfarm.report.blocks import argument, prose
 from tfarm.response.frequency import Bode, bode

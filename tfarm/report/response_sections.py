@@ -18,7 +18,7 @@ from tfarm.digits import column_format, fix_decimals, join_words, kept_digits, p
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.fitting.fit import ARMS
 from tfarm.plots import arm_sketch, frequency, motion
-from tfarm.plots.style import gains_words
+from tfarm.plots.labels import gains_words
 from tfarm.report.blocks import Fact, PageSection, Picture, picture, prose, sheet, upper
 from tfarm.report.page import ArmReport
 from tfarm.response.frequency import AXIS_SHARE, Bode
@@ -189,9 +189,9 @@ def modes_section(report: ArmReport) -> PageSection:
         except (ConvergenceError, CertificationError) as error:
             words.append(prose("no_damped_table", why=error))
     drawn = report.modes(drawn_modes)
-    shapes = motion.scaled(drawn, drawn_modes)
+    x, shapes = motion.scaled_shapes(drawn, drawn_modes)
     columns = (
-        Column("x_m", of=np.linspace(0.0, arm.length, motion.SHAPE_POINTS)),
+        Column("x_m", of=x),
         *(Column(f"mode_{number}", of=np.round(w, SHAPE_DIGITS - 1) + 0.0) for number, w in shapes.items()),
     )
     nodes = [own for number, own in zip(drawn.index, drawn.nodes, strict=True) if number in shapes]
@@ -403,7 +403,7 @@ def fit_section(report: ArmReport, count: int = ARMS) -> PageSection:
     blocks: list[Picture | Table] = []
     if fit.responses:
         names = join_words([f"{each.label} [{each.unit}]" for each in fit.responses])
-        blocks.append(picture("fit_overlay", frequency.fitted.figure(fit), names=names))
+        blocks.append(picture("fit_overlay", frequency.fit_curves.figure(fit), names=names))
     blocks += [
         sheet("fitted", table(fit.parameters), stem="fit"),
         sheet("fit_resonances", table(fit.resonances)),
@@ -445,7 +445,7 @@ def measured_section(report: ArmReport) -> PageSection:
         blocks += [
             picture(
                 "measured",
-                frequency.measured.figure(found),
+                frequency.measured_response.figure(found),
                 stem=f"measured{label}",
                 data=found.csv_table,
                 name=name,

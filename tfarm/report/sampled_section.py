@@ -109,7 +109,7 @@ def overlay_picture(report: ArmReport, found: Analysis) -> Picture:
     rows = [row for row in report.cases[0].margins.stability_intervals if row.name == MOMENT_GAIN]
     return picture(
         "sampled_overlay",
-        regions.overlay.figure(*both),
+        regions.gain_regions.figure(*both),
         data=both.columns,
         arm=report.arm,
         low=float(both.continuous.x[0]),
@@ -424,4 +424,4 @@ def tuner_blocks(data: TunerNumbers, both: StableRegions) -> Iterator[Picture | 
     learned = [Column("trial", of=range(1, curves.costs.shape[1] + 1))]
     learned += [Column(name, of=costs) for name, costs in curves.quartile_curves.items()]
     learned += [Column(f"seed_{seed}", of=costs) for seed, costs in enumerate(curves.costs)]
-    yield picture("tune_curves", motion.draw_curves.figure(curves, tuning), data=learned, curves=curves)
+    yield picture("tune_curves", motion.draw_learning.figure(curves, tuning), data=learned, curves=curves)
