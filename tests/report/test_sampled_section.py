@@ -23,7 +23,7 @@ from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
 from tfarm.plots.regions import gain_regions
 from tfarm.report import sampled_section as page
-from tfarm.report.blocks import DRAWN_DIGITS, prose, save_block
+from tfarm.report.blocks import prose, save_block
 from tfarm.report.page import FILM_FRAMES, ArmReport, GivenLaw
 from tfarm.report.sampled_section import sampled_section, slews
 from tfarm.schema import text
@@ -33,6 +33,7 @@ LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 GAINS = HubFeedback(K1=0.3, K2=0.3)
 PLANE = cache(lambda: stable_regions(Case(LAB, GAINS)))
 analysed = cache(tfarm.sampled)
+DRAWN_DIGITS = 7  # of the numbers of a picture
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ which the picture states.  Hub, bodies, springs and gauge are symbols.  Each art
 
 import math
 import re
+from functools import partial
 from itertools import cycle, pairwise
 from typing import Any
 
@@ -185,11 +186,12 @@ def _draw_gauge(arm: Arm, scale: _Scale, ax: Axes) -> None:
     ends = np.cumsum([link.length for link in arm.links])
     side: Any = "left" if gauge.side == "inner" else "right"
     segment = min(int(np.searchsorted(ends, gauge.x, side)), len(ends) - 1)
-    looks = {"marker": "s", "ms": 6.0, "mfc": GREEN, "mec": "white", "mew": 0.6}
     words = "strain gauge at the root"
     if gauge.x:
         words = f"strain gauge, {_value('x', gauge.x, 'm')}"
-    _mark(ax, "gauge", arm.hub.radius + gauge.x, words, y=scale.depths[segment] / 2, **looks)
+    place = arm.hub.radius + gauge.x
+    y = scale.depths[segment] / 2
+    _mark(ax, "gauge", place, words, y=y, marker="s", ms=6.0, mfc=GREEN, mec="white", mew=0.6)
 
 
 def _draw_attachments(arm: Arm, ax: Axes) -> None:
@@ -248,8 +250,8 @@ def _draw_payload(arm: Arm, ax: Axes) -> None:
     if payload.offset:
         words.append(_value("e", payload.offset, "m"))
         ax.plot([arm.reach, centre], [0, 0], color=INK, lw=2.0, gid="payload.offset", zorder=2.7)
-    looks: dict[str, Any] = {"marker": "s", "ms": 10.0, "mfc": "#8c8c8c", "mec": INK, "zorder": 3}
-    _mark(ax, "payload", centre, ", ".join(words), **looks)
+    label = ", ".join(words)
+    _mark(ax, "payload", centre, label, marker="s", ms=10.0, mfc="#8c8c8c", mec=INK, zorder=3)
 
 
 def _draw_springs(arm: Arm, ax: Axes) -> None:
@@ -295,5 +297,5 @@ def _letter(letter: str, gid: str, x: float, y: float, ax: Axes) -> None:
 
 
 def _arrow(ax: Axes, gid: str, **ends: Any) -> None:
-    looks: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 9, "shrinkA": 0, "shrinkB": 0}
-    ax.add_patch(FancyArrowPatch(**ends, color=ORANGE, lw=1.3, zorder=6, gid=gid, **looks))
+    draw = partial(FancyArrowPatch, arrowstyle="-|>", mutation_scale=9, shrinkA=0, shrinkB=0)
+    ax.add_patch(draw(**ends, color=ORANGE, lw=1.3, zorder=6, gid=gid))

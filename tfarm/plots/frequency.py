@@ -86,8 +86,8 @@ def draw_magnitude(data: Bode | Mapping[str, Bode], *, ax: Axes) -> None:
     each = by_name(data, "flexible arm, exact")
     first = first_of(each)
     lows, highs = zip(*map(magnitude_limits, each.values()), strict=True)
-    low = float(min(lows))
-    high = float(max(highs))
+    low = min(lows)
+    high = max(highs)
     unit = f"dB re 1 {first.gain_unit}".replace("1 −", "1")
     # above them a line of mode numbers
     over_frequency(ax, f"|{first.label} / {first.input_label}|\nmagnitude [{unit}]", 1.085)
@@ -222,9 +222,8 @@ def _over_measured(one: Measured, curves: Sequence[Drawn], upper: Axes, lower: A
     """
     hertz = in_hertz(one.omega)
     size = abs(one.values)
-    points: dict[str, Any] = {"ls": "none", "marker": ".", "ms": 3.5, "color": ORANGE, "zorder": 3}
-    upper.plot(hertz, size, label="measured", **points)
-    lower.plot(hertz, degrees_of(one.values), **points)
+    upper.plot(hertz, size, ".", ms=3.5, color=ORANGE, zorder=3, label="measured")
+    lower.plot(hertz, degrees_of(one.values), ".", ms=3.5, color=ORANGE, zorder=3)
     draw_size_and_angle(
         ((in_hertz(omega), values, looks) for omega, values, looks in curves), np.abs, upper, lower
     )

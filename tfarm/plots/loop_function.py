@@ -166,11 +166,12 @@ def _draw_margin(curve: LoopCurve, margin: tuple[float, complex, str, str], uppe
     angle = math.degrees(cmath.phase(L))
     _mark(curve, label, marker, omega, size, upper)
     _mark(curve, label, marker, omega, angle, lower)
-    ends = {"color": INK, "lw": 1.6, "ls": _looks(curve)["ls"], "zorder": 4}
-    if marker == GAIN:
-        upper.plot([omega, omega], (size, 0), **ends)
-    else:
-        lower.plot([omega, omega], (math.copysign(180, angle), angle), **ends)
+    place = upper
+    ends = (size, 0.0)
+    if marker != GAIN:
+        place = lower
+        ends = (math.copysign(180, angle), angle)
+    place.plot([omega, omega], ends, color=INK, lw=1.6, ls=_looks(curve)["ls"], zorder=4)
 
 
 def _chart(L: Complex) -> tuple[Real, Real]:
@@ -200,13 +201,18 @@ def nichols(found: Margins | LoopCurve, *, ax: Axes) -> None:
     )
     ax.grid(False)
     _draw_contours(ax)
-    ax.plot([-180], [0], "+", color=UNSTABLE, ms=12, mew=2.2, zorder=6, label="the point −1")
+    _mark_critical(-180.0, ax)
     for each in sides:
         ax.plot(*_chart(each.L), zorder=3, **_looks(each))
         if each.margins is not None:
             for _, L, words, marker in decisive(each.margins):
                 (phase,), (size,) = _chart(np.array([L]))
                 _mark(each, words, marker, phase, size, ax)
+
+
+def _mark_critical(at: float, ax: Axes, ms: float = 12) -> None:
+    """Draw the point -1."""
+    ax.plot([at], [0], "+", color=UNSTABLE, ms=ms, mew=2.2, zorder=6, label="the point −1")
 
 
 def _draw_contours(ax: Axes) -> None:
@@ -350,7 +356,7 @@ def _curve(z: Complex, critical: float, edge: float, ax: Axes) -> None:
     plot_complex(z, ax, color=BLUE, lw=1.3, zorder=3, label="ω > 0, arrows as it rises")
     plot_complex(z.conj(), ax, color=BLUE, lw=0.6, alpha=0.55, zorder=2, label="ω < 0")
     arrows(np.where(z.real < edge, z, np.nan), ax, (0.12, 0.4, 0.75), BLUE)
-    ax.plot([critical], [0], "+", color=UNSTABLE, ms=11, mew=2.2, zorder=6, ls="none", label="the point −1")
+    _mark_critical(critical, ax, 11)
 
 
 def arrows(z: Complex, ax: Axes, shares: Sequence[float] = (0.5,), color: str = INK) -> None:

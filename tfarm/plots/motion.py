@@ -7,6 +7,7 @@ its learning curves.
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import cycle
 from typing import Any
 
@@ -335,9 +336,9 @@ def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, 
     guard = tuning.training.guard
     K = tuning.training.result.K
     at, _ = tuning.trial.loop.gains.point
-    bar: dict[str, Any] = {"solid_capstyle": "butt", "zorder": 6}
-    left.plot([at, at], (guard.lo, guard.hi), color=STABLE, lw=9, alpha=0.75, **bar)
-    left.plot([at, at], (K.min(), K.max()), color=INK, lw=2.4, **bar)
+    bar = partial(left.plot, [at, at], solid_capstyle="butt", zorder=6)
+    bar((guard.lo, guard.hi), color=STABLE, lw=9, alpha=0.75)
+    bar((K.min(), K.max()), color=INK, lw=2.4)
     tuned_gain(tuning, ax=right)
     # from 0 to the continuous loop's bound, 1, and a quarter to either side
     left.set_ylim(-0.25, 1.25)

@@ -4,7 +4,9 @@ Each region is a list of intervals of one gain at each value of the other, with 
 and in `dsp`); nothing is read off a raster.  Edges are rounded as they are seen in a picture of that plane.
 """
 
+import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -156,8 +158,9 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     logarithm = np.ma.log(np.ma.masked_invalid(damping))
     # no colour of stability
     slate = "#3d5468"
-    looks: dict[str, Any] = {"colors": slate, "linewidths": 0.8, "linestyles": "-", "zorder": 2.5}
-    lines = ax.contour(across, up, logarithm, np.log(levels[-5:]), **looks)
+    heights = np.log(levels[-5:])
+    draw = partial(ax.contour, colors=slate, linewidths=0.8, linestyles="-", zorder=2.5)
+    lines = draw(across, up, logarithm, heights)
     kept = [[part for part in parts if _is_long(part, ax)] for parts in lines.allsegs]
     lines.set_paths([Path.make_compound_path(*map(Path, parts)) for parts in kept])
     for level, parts in zip(lines.levels, kept, strict=True):
@@ -172,7 +175,7 @@ def _is_long(line: Real, ax: Axes) -> bool:
     if np.array_equal(line[0], line[-1]):
         return True
     across, up = np.ptp((ax.transData - ax.transAxes).transform(line), axis=0)
-    return bool(np.hypot(across, up) > 1 / 12)
+    return math.hypot(across, up) > 1 / 12
 
 
 def _name_contour(name: str, line: Any, ax: Axes) -> None:
@@ -307,8 +310,9 @@ def gain_regions(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax:
     if continuous.arm.is_uniform:
         label = f"below it: proven by energy at C = 0 ({LYAPUNOV})"
         ax.axhline(1.0, color=INK, lw=1.1, ls=(0, (5, 3)), zorder=4, label=label)
-    looks: dict[str, Any] = {"color": "white", "mec": INK, "mew": 1.4, "ms": 7, "zorder": 6, "ls": "none"}
-    ax.plot(*loop.gains.point, "o", **looks, label=gains_words(loop.law))
+    across, up = loop.gains.point
+    label = gains_words(loop.law)
+    ax.plot(across, up, "o", color="white", mec=INK, mew=1.4, ms=7, zorder=6, label=label)
 
 
 # ------------------------------------------------------------ the map of an arm

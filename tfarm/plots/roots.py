@@ -1,6 +1,8 @@
 """Root loci: exact branches, those of python-control on a reduced model, and where they cross the axis."""
 
+import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -131,12 +133,11 @@ def _mark_values(exact: Locus, way: int, which: list[int], ax: Axes) -> None:
     start, *others = (plain(value, 3) for value in values.tolist())
     branches = held_branches(exact.branches[which])
     at = np.array([np.interp(way * values, way * exact.gain, s) for s in branches])
-    looks: dict[str, Any] = {"ls": "none", "color": INK, "mew": 1.3, "zorder": 4}
-    label = f"{exact.vary} = {start}"
+    draw = partial(plot_complex, ax=ax, ls="none", color=INK, mew=1.3, zorder=4)
     mark = "o" if begins else "x"
-    plot_complex(at[:, 0], ax, marker=mark, ms=6, mfc="white", label=label, **looks)
+    draw(at[:, 0], marker=mark, ms=6, mfc="white", label=f"{exact.vary} = {start}")
     label = f"{exact.vary} = {', '.join(others)}"
-    plot_complex(at[:, 1:].ravel(), ax, marker="o", ms=3.2, mfc=INK, label=label, **looks)
+    draw(at[:, 1:].ravel(), marker="o", ms=3.2, mfc=INK, label=label)
 
 
 def _draw_branches(shown: Complex, ax: Axes) -> None:
@@ -231,7 +232,7 @@ def s_grid(ax: Axes, *, is_named: bool = True) -> None:
 
 def _slope(ratio: float) -> float:
     """Return -Re s/Im s of a damping ratio."""
-    return float(ratio / np.sqrt(1 - ratio**2))
+    return ratio / math.sqrt(1 - ratio**2)
 
 
 def _ratio_lines(ax: Axes, apart: float) -> None:
@@ -328,9 +329,9 @@ def _z_plane(data: SampledLoci, along: SampledLocus, ax: Axes) -> None:
         plot_complex(each, ax, color=UNSTABLE, lw=1.5, zorder=3)
         for line in plot_complex(each, ax, color=STABLE, lw=1.4, zorder=3.1):
             line.set_clip_path(circle)
-        looks: dict[str, Any] = {"mec": INK, "ms": 4.0, "mew": 0.9, "zorder": 4}
-        plot_complex(each[0], ax, mark, mfc="white", label="start of the range", **looks)
-        plot_complex(each[here], ax, mark, mfc=INK, label=f"{label}, gains of the loop", **looks)
+        draw = partial(plot_complex, ax=ax, ls="none", marker=mark, mec=INK, ms=4.0, mew=0.9, zorder=4)
+        draw(each[0], mfc="white", label="start of the range")
+        draw(each[here], mfc=INK, label=f"{label}, gains of the loop")
         for branch in each.T:
             arrows(branch, ax)
     edge_marks(along.z[here], ax)

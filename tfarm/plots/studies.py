@@ -3,6 +3,7 @@
 import math
 import textwrap
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -81,11 +82,6 @@ def study(found: Study, quantity: str | None = None, *, ax: Sequence[Axes]) -> N
 
 def _draw_distribution(found: Study, each: Sequence[Spread], ax: Axes) -> None:
     """Draw the distribution of a quantity, of both loops together."""
-    looks: dict[str, dict[str, Any]] = {
-        "continuous": {"fill": True, "color": BLUE, "alpha": 0.4, "label": "continuous-time"},
-        "sampled": {"fill": False, "color": INK, "lw": 1.1, "label": "sampled"},
-        "": {"fill": True, "color": BLUE, "alpha": 0.4, "label": "arms"},
-    }
     table = found.table()
     values = [table[of.name][np.isfinite(table[of.name])] for of in each]
     low = min(of.least for of in each)
@@ -98,11 +94,17 @@ def _draw_distribution(found: Study, each: Sequence[Spread], ax: Axes) -> None:
     counts = [np.histogram(own, edges)[0] for own in values]
     top = np.max(counts)
     for n, (of, own) in enumerate(zip(each, counts, strict=True)):
-        look = looks[loop_of(of.name)]
-        ax.stairs(own, edges, **look)
+        loop = loop_of(of.name)
+        colour = BLUE
+        if loop == "sampled":
+            colour = INK
+            ax.stairs(own, edges, color=colour, lw=1.1, label=loop)
+        else:
+            label = "continuous-time" if loop else "arms"
+            ax.stairs(own, edges, fill=True, color=colour, alpha=0.4, label=label)
         height = top * (1.08 + 0.1 * n)
         ends = [of.low, of.median, of.high]
-        ax.plot(ends, [height] * 3, "|-", ms=7, markevery=[1], color=look["color"], lw=1.2)
+        ax.plot(ends, [height] * 3, "|-", ms=7, markevery=[1], color=colour, lw=1.2)
     first = each[0]
     label = with_unit(quantity_of(first.name).label, first.unit)
     ax.set(xlabel=_fold_label(label), ylabel="arms [−]", ylim=(0, 1.27 * top))
@@ -181,14 +183,15 @@ def _draw_marks(x: Real, y: Real, words: Any, ax: Axes) -> None:
     edge = np.where(np.isnan(y), 0.02, 0.98)
     is_finite = np.isfinite(y)
     for word, (colour, mark) in marks.items():
-        looks: dict[str, Any] = {"color": colour, "ms": 3.4, "alpha": 0.75, "label": word or "not determined"}
+        label = word or "not determined"
+        draw = partial(ax.plot, ls="none", marker=mark, color=colour, ms=3.4, alpha=0.75, label=label)
         is_word = words == word
         here = is_finite & is_word
         if here.any():
-            ax.plot(x[here], y[here], mark, **looks)
+            draw(x[here], y[here])
         here = ~is_finite & is_word
         if here.any():
-            ax.plot(x[here], edge[here], mark, transform=ax.get_xaxis_transform(), **looks)
+            draw(x[here], edge[here], transform=ax.get_xaxis_transform())
 
 
 @picture(

@@ -420,12 +420,12 @@ def plot_complex(z: Complex, ax: Axes, *marks: str, **looks: Any) -> list[Line2D
 
 
 def key_line(label: str, ax: Axes, **looks: Any) -> None:
-    """Give the legend a line that stands for several."""
+    """Give the legend one line for several."""
     ax.plot([], [], label=label, **looks)
 
 
 def key_area(label: str, ax: Axes, **looks: Any) -> None:
-    """Give the legend an area that stands for several."""
+    """Give the legend one area for several."""
     ax.fill_between([], [], [], label=label, **looks)
 
 
