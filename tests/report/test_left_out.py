@@ -22,11 +22,11 @@ from tfarm.dsp import Chain, load_chain
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import fit
 from tfarm.report import page as report_page
-from tfarm.report import write, writing
+from tfarm.report import sections, write, writing
 from tfarm.report.blocks import render
 from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import fit_section
-from tfarm.report.writing import SectionSpec, make_section, pieces_of
+from tfarm.report.sections import SectionSpec, make_section, pieces_of
 
 OMEGA = np.geomspace(8.0, 300.0, 30)
 NOT_OF_IT = Measured(output="root_moment", input="hub_torque", omega=OMEGA, values=OMEGA + 0j)  # of a hub that turns
@@ -81,7 +81,7 @@ def test_an_index_without_the_picture_of_an_arm_names_it(tmp_path, monkeypatch):
 def with_a_bug(monkeypatch):
     """Put a section of a bug in the place of the page of the arm: what is written first is made before it."""
     broken = SectionSpec("the arm", "arm", Unmakeable(ValueError("a bug")), on="modes")
-    monkeypatch.setattr(writing, "PIECES", (broken,))
+    monkeypatch.setattr(sections, "PIECES", (broken,))
 
 
 def test_overview_and_live_page_are_written_first_and_stay(tmp_path, monkeypatch):

@@ -221,5 +221,5 @@ def check(
         from tfarm import plots
         from tfarm.arm import load
 
-        plots.style.save_picture(plots.sketch.figure, load(arm), png)
+        plots.files.save_picture(plots.sketch.figure, load(arm), png)
     show(found, also=(png,))

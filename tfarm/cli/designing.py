@@ -426,7 +426,7 @@ def study(
         )
     page = None
     if report:
-        from tfarm.report.writing import write_study
+        from tfarm.report.study_page import write_study
 
         page = write_study(found)
     show(found, None if any(key.startswith("law.") for key in keys) else defaults, also=(page,))

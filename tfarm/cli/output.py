@@ -75,7 +75,7 @@ def emit(
         from tfarm import plots
 
         draw = getattr(plots, picture).figure if picture else plots.style.FIGURES[type(record)]
-        plots.style.save_picture(draw, record, png)
+        plots.files.save_picture(draw, record, png)
     show(record, defaults, (*also, csv, png), curve_table(record) if rows and csv is None else None)
 
 

@@ -67,10 +67,10 @@ def report(
     paper: each figure as a PDF at the width of a paper's column too, which takes about a quarter longer
     """
     from tfarm.fitting import data, recording
-    from tfarm.report import page, write, writing
+    from tfarm.report import page, sections, write
 
     if only is not None:
-        must_be_known("--only", only, writing.QUESTIONS)
+        must_be_known("--only", only, sections.QUESTIONS)
     files = read_arms(arms or tfarm.presets())
     others = read_arms(law or [])
     subjects = [load_arm(file, theory) for file in files]

@@ -53,7 +53,7 @@ from tfarm.loop.sampled_brief import SampledBrief, sampled_brief
 from tfarm.loop.sampled_modes import STRONGER, SampledLoci, sampled_loci
 from tfarm.loop.sampled_verdict import Verdict, sampled_verdict
 from tfarm.loop.spillover import Spill, spill
-from tfarm.plots.style import gains_words
+from tfarm.plots.labels import gains_words
 from tfarm.records import frozen
 from tfarm.report.blocks import argument, prose
 from tfarm.response.frequency import Bode, bode
@@ -132,7 +132,7 @@ class PageCase(OfCase):
         return f"{self.name}: {self.gains}"
 
     def stem(self, suffix: str) -> str:
-        """The name of a file of it."""
+        """Return the name of a file of it."""
         return f"{self.key.replace('_', '-')}-{suffix}"
 
     # the continuous-time loop, and both
@@ -448,7 +448,7 @@ def best(arm: Arm, chain: Chain) -> Design | None:
 
 
 def sign_words(arm: Arm) -> str:
-    """The law, and the sign of its moment gain."""
+    """Return the law, and the sign of its moment gain."""
     return prose("signs", law=sign_of(arm))
 
 
@@ -461,7 +461,7 @@ def is_preset(arm: Arm, chain: Chain) -> bool:
 
 
 def file_of(report: ArmReport) -> str:
-    """The arm's file with its chain, and with the law that the page is about where TOML can say that alone."""
+    """Return the arm's file with its chain, and with the law that the page is about where TOML can say that alone."""
     law = own_law(report)
     if law is None:
         return file_text(report.arm, report.chain)
@@ -469,7 +469,7 @@ def file_of(report: ArmReport) -> str:
 
 
 def own_law(report: ArmReport) -> str | None:
-    """The table [law] of the one law of a page; None of none or several, or of one with files of its own."""
+    """Return the table [law] of the one law of a page; None of none or several, or of one with files of its own."""
     with suppress(ParameterError):
         if len(report.laws) == 1 and report.laws[0].measured is None:
             return law_toml(report.cases[0].law)
