@@ -60,9 +60,13 @@ def share_tasks(
             begin(count)
             if own is None and not running:
                 return
-            begun([*running.values()][:others] + ([] if own is None else [own[0]]))
-            if own is not None:
-                yield own[0], own[1]()
+            now = [*running.values()][:others]
+            if own is None:
+                begun(now)
+            else:
+                task, call = own
+                begun([*now, task])
+                yield task, call()
             for future in wait(running, None if own is None else 0.0, FIRST_COMPLETED).done:
                 task = running.pop(future)
                 yield task, future.result()

@@ -9,7 +9,7 @@ from mpmath import findroot, mpc, mpf, workdps
 import tfarm
 from tfarm import audit
 from tfarm.audit import kept, kept_audit, paper
-from tfarm.audit.equations import BEAM_NAMES, by_transition
+from tfarm.audit.equations import Beam, by_transition
 from tfarm.schema import to_dict, to_json
 
 VERDICTS = {
@@ -83,7 +83,7 @@ def test_numbers_of_the_evidence_are_those_of_other_methods(rows):
     for K2, near in ((0.5, -1 + 57j), (1.1, 2 + 21j)):
 
         def returned(s, K2=K2):
-            theta, _, _, moment = by_transition(dict(zip(BEAM_NAMES, (*map(mpf, numbers), s), strict=True)))
+            theta, _, _, moment = by_transition(Beam(*map(mpf, numbers), s))
             return 1 + 0.3 * s * theta + K2 * moment
 
         with workdps(60):

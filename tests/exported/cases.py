@@ -12,8 +12,8 @@ from tfarm.dsp import Actuator, Chain, Converters, Sampling, load_chain
 from tfarm.dsp.kernel import AMPLIFIER, ENCODER
 from tfarm.dsp.simulate import quantisers
 from tfarm.exported.controller import controller_of, in_z
+from tfarm.exported.realisations import least_noise
 from tfarm.exported.result import ExportTask
-from tfarm.exported.word_length import least_noise
 
 LAB = tfarm.load("sasaki2012-lab")
 RIG = Path(__file__).parents[1] / "data" / "quanser-2dsfl"

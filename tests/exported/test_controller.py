@@ -78,7 +78,7 @@ def test_the_code_is_the_simulation(case, precision):
     chain = replace(chain, converters=replace(chain.converters, arithmetic=arithmetic))
     controller, _ = realised(task_of((arm, law, chain), precision))
     slew = scenario("slew", arm, chain, 1.5)
-    own = Simulator(Case(arm, controller.word.rounded, chain), slew, count=6)
+    own = Simulator(Case(arm, controller.word.rounded_law, chain), slew, count=6)
     done = own.run()
     signals = readings(done)
     columns = [signals[name] for name in controller.signals]

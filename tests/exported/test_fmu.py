@@ -4,6 +4,7 @@ import re
 import zipfile
 from ctypes import c_double
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
@@ -357,7 +358,7 @@ def test_equal_inputs_have_equal_bytes(tmp_path):
 @pytest.mark.parametrize("text", thinned(C_TEXTS, 3))
 def test_names_of_a_user_reach_c_and_xml_as_text(tmp_path, text, monkeypatch):
     """The name of the arm where it is a legal one, and that of the identifiers."""
-    monkeypatch.setattr(module, "COMPILERS", ())
+    monkeypatch.setattr(module, "binary_of", lambda sources, identifier: ({}, "none"))
     try:
         arm = replace(LAB, name=text)
     except ParameterError:
@@ -385,7 +386,7 @@ def test_names_of_a_user_reach_c_and_xml_as_text(tmp_path, text, monkeypatch):
     ("script", "reason"),
     [
         (None, "no compiler found .*"),
-        ("sleep 9", r".*timed out after 0\.2 seconds"),
+        ("exec /bin/sleep 9", r".*timed out after 0\.2 seconds"),
         ("exit 3", r".*exit status 3\."),
     ],
 )
@@ -394,8 +395,8 @@ def test_without_a_compiler_that_works_there_is_the_source(tmp_path, monkeypatch
     if script:
         broken.write_text(f"#!/bin/sh\n{script}\n", encoding="ascii")
         broken.chmod(0o755)
-    monkeypatch.setattr(module, "COMPILERS", (str(broken),))
-    monkeypatch.setattr(module, "LONGEST_COMPILATION", 0.2)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(module, "binary_of", partial(module.binary_of, longest=0.2))
     with modes_of_units(1):
         found = tfarm.export(LAB, GAINS, what="plant", form="fmu", folder=tmp_path)
     assert re.fullmatch(f"none: {reason}", found.details.binary)
@@ -405,7 +406,7 @@ def test_without_a_compiler_that_works_there_is_the_source(tmp_path, monkeypatch
 
 def test_an_arm_without_a_slew_has_the_modes_of_a_step(tmp_path, monkeypatch):
     """A hub held by a spring."""
-    monkeypatch.setattr(module, "COMPILERS", ())
+    monkeypatch.setattr(module, "binary_of", lambda sources, identifier: ({}, "none"))
     held = replace(LAB, hub=replace(LAB.hub, stiffness=20.0))
     found = tfarm.export(held, GAINS, what="plant", form="fmu", folder=tmp_path)
     assert found.details.modes == simulated_run(Case(held, GAINS, IDEAL), "step", 3.0).used.modes

@@ -15,17 +15,8 @@ from tfarm.case import Case
 from tfarm.dsp import Converters
 from tfarm.errors import ParameterError
 from tfarm.exported.controller import c_controller, in_z
-from tfarm.exported.word_length import (
-    BALANCED,
-    SECTIONS,
-    absolute_sum,
-    candidates,
-    close_around_law,
-    gramians,
-    observable_part,
-    similar,
-    with_system_matrix,
-)
+from tfarm.exported.realisations import candidates, close_around_law, gramians, similar, with_system_matrix
+from tfarm.exported.word_length import absolute_sum, observable_part
 
 SERVO = tfarm.Law(
     {"hub_angle": ([6.0, 8.0], [0.02, 1.0]), "root_moment": ([0.1], [0.01, 1.0])}, references=("hub_angle",)
@@ -52,7 +43,7 @@ def test_every_realisation_has_the_transfer_functions_of_the_law(law):
         names.append(gain.realisation)
         own = np.stack([C @ np.linalg.solve(each * np.eye(len(A)) - A, B) + D for each in z])[:, 0]
         assert abs(own.T - given.values(z)).max() <= 1e-11 * abs(own).max()
-    assert {SECTIONS, BALANCED} < set(names)
+    assert {"second-order sections", "balanced state space"} < set(names)
 
 
 def test_noise_gains_are_those_of_lyapunov_equations():
@@ -65,7 +56,7 @@ def test_noise_gains_are_those_of_lyapunov_equations():
         W = solve_discrete_lyapunov(of.matrix.T, np.outer(of.output, of.output))
         k, w, variance = np.diag(K)[of.states], np.diag(W)[of.states], of.output @ K @ of.output
         assert gain.gain == pytest.approx(k @ w / variance, rel=1e-6)
-        if gain.realisation == BALANCED:
+        if gain.realisation == "balanced state space":
             assert k / variance == pytest.approx(w, rel=1e-6)
             K, W = gramians(of)
             assert abs(K - np.diag(np.diag(K))).max() <= 1e-9 * abs(K).max()

@@ -24,7 +24,8 @@ from tfarm.arm.law import REFERENCE
 from tfarm.case import Case
 from tfarm.dsp import Actuator, Converters
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.exported.controller import SATURATED, STATE_SATURATED, in_z, word_length
+from tfarm.exported.controller import in_z, word_length
+from tfarm.exported.kernel import Status
 from tfarm.exported.result import ExportTask
 
 DIGITS = 400  # binary, after the point
@@ -102,7 +103,7 @@ def output_of(law, e):
 def responses(task, controller, steps):
     """Responses (steps, inputs but the feedforward) of the output, and of its error by the rounded coefficients."""
     found = []
-    for law in (controller.word.law, controller.word.rounded):
+    for law in (controller.word.law, controller.word.rounded_law):
         A, B, C, D = law.matrices((*law.signals, *law.wanted))
         x, h = B, [D[0]]
         for _ in range(steps - 1):
@@ -223,11 +224,11 @@ def compared(controller, inputs, truth, bound):
             most = max(most, float(Fraction(abs(own - inside), 2**DIGITS)) / bound)
         beyond, level = float(Fraction(u - inside, 2**DIGITS)), max(level, abs(float(Fraction(u, 2**DIGITS))))
         margin = bound if low is None else float(Fraction(min(inside - low, high - inside), 2**DIGITS))
-        if abs(beyond) > bound and status[k] not in (SATURATED, STATE_SATURATED):
+        if abs(beyond) > bound and status[k] not in (Status.SATURATED, Status.STATE_SATURATED):
             fault = fault or f"status {status[k]} of a clipped output at {k}"
-        if status[k] not in (0, STATE_SATURATED) and (status[k] != SATURATED or margin > bound):
+        if status[k] not in (0, Status.STATE_SATURATED) and (status[k] != Status.SATURATED or margin > bound):
             fault = fault or f"status {status[k]} without a reason at {k}"
-        if status[k] == STATE_SATURATED:
+        if status[k] == Status.STATE_SATURATED:
             break
     return most, level, fault
 

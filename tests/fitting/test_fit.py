@@ -3,7 +3,7 @@
 import math
 import tomllib
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from tests import chain_elements
 from tests.fitting.planted import chi_squared_at, elements_response, judged, judged_pair, judged_rig
 from tests.shared import refusal, thinned
 from tests.shell import answer, refused, run
+from tfarm.fitting import solve
 from tfarm.fitting.data import noise_of
 from tfarm.fitting.fit import fit, is_named
 from tfarm.fitting.model import RingMode, eigenvalue, mode_of
@@ -307,7 +308,7 @@ def test_the_form_of_a_decay():
 
 def test_a_search_out_of_evaluations_goes_on_once(monkeypatch):
     """From 6 % below Young's modulus nine evaluations lead to the minimum."""
-    monkeypatch.setattr("tfarm.fitting.solve.MOST_EVALUATIONS", 7)
+    monkeypatch.setattr(solve, "nearest_minimum", partial(solve.nearest_minimum, evaluations=7))
     monkeypatch.setattr("tfarm.fitting.solve.start_by", lambda problem, draws, shares: (problem, np.array([-0.06])))
     found = fit(LAB, measured(omega=OMEGA[::4]), free=["link.youngs_modulus"], profile=False)
     assert found.converged

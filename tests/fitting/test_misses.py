@@ -28,7 +28,7 @@ LINES = np.linspace(10.0, 400.0, 196)
 class Given(Problem):
     """A problem whose computed responses are given."""
 
-    def computed(self, point):
+    def compute(self, point):
         return [point]
 
 

@@ -11,8 +11,9 @@ import tfarm
 from tests.shared import refusal
 from tests.shell import answer, refused, run
 from tfarm.fitting.data import Measured, noise_of
-from tfarm.fitting.overlay import Ratio, overlay
-from tfarm.fitting.resonances import _around, matched_peaks, must_be_in_unit, peaks_of, resonance_at
+from tfarm.fitting.overlay import overlay
+from tfarm.fitting.ratio import Ratio
+from tfarm.fitting.resonances import lines_of_peak, matched_peaks, must_be_in_unit, peaks_of, resonance_at
 
 LAB = tfarm.load("sasaki2012-lab")
 TRUE = replace(LAB, link=replace(LAB.link, youngs_modulus=1.2 * LAB.link.youngs_modulus, damping=2e-4))
@@ -41,7 +42,7 @@ def found():
 def test_each_resonance_is_the_true_arms_pole_and_residue(pair, found):
     """Within five of the deviations that the fit to its lines gives; the poles are followed from the undamped modes."""
     one, ratio = found[pair], Ratio(TRUE, *pair)
-    eigenvalues = tfarm.damped_modes(tfarm.modes(ratio.driven, 4)).eigenvalues
+    eigenvalues = tfarm.damped_modes(tfarm.modes(ratio.driven_arm, 4)).eigenvalues
     poles = np.sort_complex(eigenvalues[eigenvalues.imag > 0])[::-1]
     assert [row.mode for row in one.modes] == [1, 2, 3]
     for row, pole in zip(one.modes, poles, strict=False):
@@ -62,7 +63,7 @@ def test_of_the_true_arm_only_the_sensor_differs():
         assert row.frequency_ratio == pytest.approx(1.0, abs=1e-3)
         assert row.level_db == pytest.approx(20 * np.log10(-GAIN), abs=0.5)
     for row in one.modes[:2]:  # the third overlaps its neighbours
-        kept = one.measured.omega[_around(one.measured, int(np.argmin(abs(OMEGA - row.peak))))]
+        kept = one.measured.omega[lines_of_peak(one.measured, int(np.argmin(abs(OMEGA - row.peak))))]
         half, line = row.damping_ratio * abs(row.pole), OMEGA[1] - OMEGA[0]
         assert kept[[0, -1]] == pytest.approx(row.peak + 3 * half * np.array([-1, 1]), abs=0.3 * half + 3 * line)
 

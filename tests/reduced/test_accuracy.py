@@ -20,7 +20,10 @@ from tests.shared import thinned
 from tests.strategies import some_arm
 from tests.survey import Finding, each_of
 from tfarm.reduced import modal_model, reduce
-from tfarm.reduced.partial_fractions import EXACT_ROUNDING, FOUND_TO_WORST, Ruler, values_and_norm
+from tfarm.reduced.partial_fractions import EXACT_ROUNDING, Ruler, values_and_norm
+
+# of a printed error over the largest one that the search finds
+MARGIN = 1.02
 
 
 def test_a_planted_error_is_found_whole(arm):
@@ -32,7 +35,7 @@ def test_a_planted_error_is_found_whole(arm):
     G = tfarm.transfer(arm, "root_moment")
     exact = G(1j * w)
     true = 1e-3 / (abs(exact) + abs(w * G.derivative(1j * w))).min()
-    assert true <= worst[0] <= 1.03 * FOUND_TO_WORST * true
+    assert true <= worst[0] <= 1.03 * MARGIN * true
 
 
 @pytest.mark.parametrize("moved", [1.3e-6, 2.7e-5])
@@ -66,7 +69,7 @@ def test_the_margin_covers_a_peak_that_is_not_closed_in_on(arm):
     s = 1j * w[:, None]
     true = float((abs((r / (s - p) + r / (s - p.conj())).sum(axis=1)) / values_and_norm(ruler.G, w)[1][0]).max())
     printed = float(ruler.measure(planted)[0][0])
-    assert printed / FOUND_TO_WORST < 0.998 * true, "the search found it after all: a test of nothing"
+    assert printed / MARGIN < 0.998 * true, "the search found it after all: a test of nothing"
     assert true <= printed
 
 

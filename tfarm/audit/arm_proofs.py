@@ -75,7 +75,7 @@ class Boxed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArmProof:
-    """Of one arm: brackets (lower, upper) [rad/s] of its first flexible frequencies, the count that completes them.
+    """Proofs on one arm: brackets (lower, upper) [rad/s] of its first flexible frequencies, and their count.
 
     `count` frequencies lie below `below` [rad/s], a rigid-body mode included if `has_rigid_mode`.  `errors` has
     (output, worst |G_64/G - 1| / (1 + |s G'/G|)) over frequencies in `band`.  `failure` is what could
@@ -116,12 +116,16 @@ class ArmProof:
         self,
     ) -> Annotated[float | None, Quantity("below", "rad/s", 9, help="frequency at which the count is made")]:
         """The frequency of the count."""
-        return float(self.below) if self.below else None
+        if not self.below:
+            return None
+        return float(self.below)
 
     @property
     def verdict(self) -> Annotated[str, Quantity("verdict", help="whether as many are enclosed as counted")]:
         """Whether the list is complete."""
-        return f"{UNPROVEN}: {self.failure}" if self.failure else "complete, proven"
+        if self.failure:
+            return f"{UNPROVEN}: {self.failure}"
+        return "complete, proven"
 
     @property
     def source(
@@ -137,9 +141,8 @@ class ArmProof:
         """The proven digits of each bracket: its lower end cut off, with its zeros."""
         with localcontext(prec=self.digits + 5):
             lower = [Decimal(bracket[0]) for bracket in self.brackets]
-            return [
-                f"{each.quantize(Decimal(1).scaleb(each.adjusted() - self.digits + 1)):f}" for each in lower
-            ]
+            ends = [Decimal(1).scaleb(each.adjusted() - self.digits + 1) for each in lower]
+            return [f"{each.quantize(end):f}" for each, end in zip(lower, ends, strict=True)]
 
 
 def prove(arm: Arm, chain: Chain | None = None) -> ArmProof:

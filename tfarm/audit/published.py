@@ -52,7 +52,7 @@ class Source:
 
 
 def arm_of_case(case: Mapping[str, Any]) -> Arm:
-    """The arm of a case: the beam of the file with the case's own tables in the place of its own."""
+    """Return the arm of a case: the beam of the file with the case's own tables in the place of its own."""
     beam = DATA["beam"]
     slenderness = case.get("slenderness", beam["slenderness"])
     section = beam["section"] | {"second_moment": slenderness**-2}
@@ -62,17 +62,25 @@ def arm_of_case(case: Mapping[str, Any]) -> Arm:
 
 
 def _source(table: dict[str, Any]) -> Source:
-    """The source of a table, whose theory and quantity are those of its cases but where these have others."""
-    cases = tuple(
-        PrintedColumn(
-            arm=arm_of_case(case),
-            printed=tuple(case["printed"]),
-            why=dict.fromkeys(case.get("differs", ()), case.get("why", "")),
-            **{key: case[key] for key in ("name", "theory", "quantity")},
-        )
-        for case in (table | each for each in table["case"])
+    """Return the source of a table, whose theory and quantity are those of its cases but where these have others."""
+    return Source(
+        key=table["key"],
+        citation=table["citation"],
+        reached=table["reached"],
+        cases=tuple(_column(table | case) for case in table["case"]),
     )
-    return Source(cases=cases, **{key: table[key] for key in ("key", "citation", "reached")})
+
+
+def _column(case: dict[str, Any]) -> PrintedColumn:
+    """Return the column of a case."""
+    return PrintedColumn(
+        name=case["name"],
+        arm=arm_of_case(case),
+        theory=case["theory"],
+        quantity=case["quantity"],
+        printed=tuple(case["printed"]),
+        why=dict.fromkeys(case.get("differs", ()), case.get("why", "")),
+    )
 
 
 ALL = tuple(map(_source, DATA["source"]))
@@ -122,25 +130,29 @@ class PublishedDifference(NamedTuple):
 
 
 def validate(sources: tuple[Source, ...] = ALL) -> tuple[PublishedRow, ...]:
-    """Every row of every source.
+    """Return every row of every source.
 
     Raises CertificationError naming the rows that differ beyond their printed digits without a reason, or that give
     a reason and agree.
     """
-    found = tuple(row for source in sources for case in source.cases for row in case_rows(source.key, case))
-    wrong = [row for row in found if row.agrees == bool(row.why)]
+    found: list[PublishedRow] = []
+    for source in sources:
+        for case in source.cases:
+            found += case_rows(source.key, case)
+    wrong = []
+    for row in found:
+        if row.agrees == bool(row.why):
+            fault = "which agrees though a reason is given" if row.agrees else "and no reason is given"
+            head = f"{row.source}, {row.case}, mode {row.mode}"
+            wrong.append(f"{head}: printed {row.printed}, exact {row.ours:.10g}, {fault}")
     if wrong:
-        texts = (
-            f"{row.source}, {row.case}, mode {row.mode}: printed {row.printed}, exact {row.ours:.10g}"
-            + (", which agrees though a reason is given" if row.agrees else ", and no reason is given")
-            for row in wrong
-        )
-        raise CertificationError("; ".join(texts))
-    return found
+        raise CertificationError("; ".join(wrong))
+    return tuple(found)
 
 
 def case_rows(key: str, case: PrintedColumn) -> list[PublishedRow]:
-    """The rows of one column of a table."""
+    """Return the rows of one column of a table."""
+    found = exact_numbers(case).tolist()
     return [
         PublishedRow(
             source=key,
@@ -153,14 +165,12 @@ def case_rows(key: str, case: PrintedColumn) -> list[PublishedRow]:
             agrees=agrees(ours, printed),
             why=case.why.get(mode, ""),
         )
-        for mode, (printed, ours) in enumerate(
-            zip(case.printed, exact_numbers(case).tolist(), strict=True), start=1
-        )
+        for mode, (printed, ours) in enumerate(zip(case.printed, found, strict=True), start=1)
     ]
 
 
 def exact_numbers(case: PrintedColumn) -> NDArray[np.float64]:
-    """The exact solution's numbers for a column, in its quantity."""
+    """Return the exact solution's numbers for a column, in its quantity."""
     link = case.arm.link
     count = len(case.printed)
     table = modes(case.arm, count, theory=case.theory)
@@ -198,18 +208,14 @@ class Validation:
         Quantity("differences", help="numbers whose printed digits are not reached, a row a reason"),
     ]:
         """A row a reason."""
-        rows = (row for row in self.rows if not row.agrees)
-        groups = ((key, list(of)) for key, of in groupby(rows, attrgetter("source", "case", "why")))
-        return [
-            PublishedDifference(
-                source,
-                case,
-                ", ".join(str(row.mode) for row in of),
-                max((r.difference for r in of), key=abs),
-                why,
-            )
-            for (source, case, why), of in groups
-        ]
+        differing = [row for row in self.rows if not row.agrees]
+        found = []
+        for (source, case, why), group in groupby(differing, attrgetter("source", "case", "why")):
+            rows = list(group)
+            modes_text = ", ".join(str(row.mode) for row in rows)
+            largest = max((row.difference for row in rows), key=abs)
+            found.append(PublishedDifference(source, case, modes_text, largest, why))
+        return found
 
     @property
     def agree(
@@ -220,7 +226,7 @@ class Validation:
             "agree to the last printed digit", help="count of printed numbers that the exact value rounds to"
         ),
     ]:
-        """How many numbers agree."""
+        """The number of numbers that agree."""
         return sum(row.agrees for row in self.rows)
 
     @property
@@ -235,5 +241,5 @@ class Validation:
             "count of printed numbers with another last digit and a known cause",
         ),
     ]:
-        """How many do not."""
+        """The number of those that do not."""
         return sum(bool(row.why) for row in self.rows)

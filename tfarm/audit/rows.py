@@ -22,12 +22,8 @@ TEXTS: dict[str, dict[str, str]] = {each["equation"]: each for each in DATA["cla
 
 
 def formula_of(equation: str) -> str:
-    """The formula that passes the check of its equation: as corrected, or as printed."""
+    """Return the formula that passes the check of its equation: as corrected, or as printed."""
     return TEXTS[equation].get("corrected") or TEXTS[equation]["printed"]
-
-
-# relative: numbers are compared at 50 digits
-RESIDUAL_NOISE = 1e-25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,8 +50,10 @@ class AuditRow:
 
 
 def is_zero(residual: str) -> bool:
-    """Whether a residual is "0", or a number below RESIDUAL_NOISE."""
+    """Whether a residual is "0", or a number that is zero but for rounding."""
+    # relative: numbers are compared at 50 digits
+    noise = 1e-25
     try:
-        return abs(float(residual)) < RESIDUAL_NOISE
+        return abs(float(residual)) < noise
     except ValueError:
         return False

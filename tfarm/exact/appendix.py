@@ -38,10 +38,13 @@ class Appendix:
     def __init__(self, arm: Arm, s: Number) -> None:
         link = arm.link
         payload = arm.payload
-        self.L, self.A, self.rho = mpf(link.length), mpf(link.section.area), mpf(link.density)
+        self.L = mpf(link.length)
+        self.A = mpf(link.section.area)
+        self.rho = mpf(link.density)
         self.kappa_G = mpf(link.shear_factor) * mpf(link.shear_modulus)
         self.EI = mpf(link.youngs_modulus) * mpf(link.section.second_moment)
-        self.s, self.damper = s, 1 + mpf(link.damping) * s
+        self.s = s
+        self.damper = 1 + mpf(link.damping) * s
         # of each row the weights of motion and force
         inertias = (payload.mass, payload.inertia, arm.hub.inertia)
         self.ends = [(mpf(1), mpf(0)) if math.isinf(each) else (each * s**2, mpf(1)) for each in inertias]
@@ -110,7 +113,9 @@ class Appendix:
 
     def value(self, wanted: Output, x: Number) -> Number:
         """Return the output's quantity at x [m]; M = E I (1 + C s) Phi', Q = kappa G A (Y' - Phi)."""
-        EI = self.EI if wanted.gauge else self.EI * self.damper
+        EI = self.EI
+        if not wanted.gauge:
+            EI = EI * self.damper
         fields: dict[str, Callable[[], Number]] = {
             "theta": lambda: self.Theta,
             "W": lambda: self.Y(x) + x * self.Theta,
@@ -125,7 +130,7 @@ class Appendix:
 def determinant(arm: Arm, s: complex, digits: int) -> Number:
     """Return the paper's Delta at s [1/s] to `digits`.  Raises ConvergenceError at s = 0 and at the cut-off."""
     try:
-        return _agreed(lambda: [Appendix(arm, mpc(s)).Delta], digits, f"Delta at s = {s}")[0]
+        return _repeat_to_agreement(lambda: [Appendix(arm, mpc(s)).Delta], digits, f"Delta at s = {s}")[0]
     except ZeroDivisionError:
         raise ConvergenceError(
             f"Delta has no value at s = {s}, where a wave number is zero", None, None
@@ -159,14 +164,18 @@ def output_value(arm: Arm, name: str | Output, s: complex, digits: int, x: float
         try:
             value = Appendix(arm, at).value(wanted, mpf(place))
         except ZeroDivisionError:
-            aside = at + (at if at else 1) * mpf(10) ** (-mp.dps // 8)
+            aside = at + (at or 1) * mpf(10) ** (-mp.dps // 8)
             value = Appendix(arm, aside).value(wanted, mpf(place))
-        value = value if is_real else value * at**wanted.power
-        return [value.real] if is_real else [value.real, value.imag]
+        if is_real:
+            return [value.real]
+        value = value * at**wanted.power
+        return [value.real, value.imag]
 
-    found = _agreed(parts, digits, f"{wanted.name} at s = {s}")
+    found = _repeat_to_agreement(parts, digits, f"{wanted.name} at s = {s}")
     with mpmath.workdps(2 * digits + FEWEST_DIGITS):
-        return found[0] * mpc(s) ** wanted.power if is_real else mpc(*found)
+        if is_real:
+            return found[0] * mpc(s) ** wanted.power
+        return mpc(*found)
 
 
 def _smooth(arm: Arm, w: Number) -> Number:
@@ -186,7 +195,7 @@ def roots_near(arm: Arm, omega: float | str | Number, digits: int) -> int:
         half_circle = [mpf(omega) * (1 + mpmath.expjpi(mpf(n) / 8) / mpf(10) ** digits) for n in range(9)]
 
     def delta(w: Number) -> Number:
-        return _agreed(lambda: [_smooth(undamped, w)], FEWEST_DIGITS, f"Delta at {w}")[0]
+        return _repeat_to_agreement(lambda: [_smooth(undamped, w)], FEWEST_DIGITS, f"Delta at {w}")[0]
 
     values = [delta(w) for w in half_circle]
     turns = [float(mpmath.arg(after / before)) for before, after in pairwise(values)]
@@ -200,22 +209,23 @@ def natural_frequency(arm: Arm, near: float, digits: int) -> Number:
     """
     undamped = arm.having(damping=0.0)
 
+    def real_part(w: Number) -> Number:
+        return _smooth(undamped, w).real
+
     def root() -> list[Number]:
-        ends = mpf(near), mpf(near) * (1 + mpf(10) ** -8)
+        start = mpf(near)
+        ends = start, start * (1 + mpf(10) ** -8)
         try:
-            return [
-                mpmath.findroot(
-                    lambda w: _smooth(undamped, w).real, ends, solver="secant", tol=0, verify=False
-                )
-            ]
+            found = mpmath.findroot(real_part, ends, solver="secant", tol=0, verify=False)
         except ZeroDivisionError:
             # both ends are the root, to the last digit
-            return [ends[0]]
+            return [start]
+        return [found]
 
-    return _agreed(root, digits, f"the root of Delta near {near} rad/s")[0]
+    return _repeat_to_agreement(root, digits, f"the root of Delta near {near} rad/s")[0]
 
 
-def _agreed(evaluate: Callable[[], list[Number]], digits: int, what: str) -> list[Number]:
+def _repeat_to_agreement(evaluate: Callable[[], list[Number]], digits: int, what: str) -> list[Number]:
     """Return evaluate() at a working precision doubled until two results agree, each number to its digits."""
     # of working precision
     most_digits = 10_000
@@ -236,8 +246,12 @@ def _agreed(evaluate: Callable[[], list[Number]], digits: int, what: str) -> lis
 
 def _determinant(a: list[list[Number]]) -> Number:
     """Return a determinant by Laplace's expansion in 2x2 minors, as mpmath's fails for a badly scaled matrix."""
-    pairs = list(combinations(range(4), 2))
-    upper, lower = (
-        [row[i] * next_[j] - row[j] * next_[i] for i, j in pairs] for row, next_ in (a[:2], a[2:])
-    )
-    return sum(sign * m * n for sign, m, n in zip((1, -1, 1, 1, -1, 1), upper, reversed(lower), strict=True))
+    upper = _minors(a[0], a[1])
+    lower = _minors(a[2], a[3])
+    signs = (1, -1, 1, 1, -1, 1)
+    return sum(sign * m * n for sign, m, n in zip(signs, upper, reversed(lower), strict=True))
+
+
+def _minors(above: list[Number], below: list[Number]) -> list[Number]:
+    """Return the 2x2 minors of two rows."""
+    return [above[i] * below[j] - above[j] * below[i] for i, j in combinations(range(4), 2)]

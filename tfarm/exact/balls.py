@@ -65,7 +65,9 @@ def point(s: complex) -> Ball:
 
 def root(z: Ball) -> Ball:
     """Return a square root with its branch cut away from the ball, of either sign, for even functions."""
-    return z.sqrt() if z.real.mid() >= 0 else (-z).sqrt() * flint.acb(0, 1)
+    if z.real.mid() >= 0:
+        return z.sqrt()
+    return (-z).sqrt() * flint.acb(0, 1)
 
 
 def transition(z_sum: Ball, z_product: Ball) -> tuple[Ball, ...]:
@@ -124,7 +126,9 @@ class Sweep:
     exact: Callable[[Any], Any] = staticmethod(rational)
 
     def __init__(self, layout: Layout, s: Any, S: Any = None) -> None:
-        self.layout, self.s, self.S = layout, s, s * s if S is None else S
+        self.layout = layout
+        self.s = s
+        self.S = s * s if S is None else S
         key = self.exact, flint.ctx.prec
         self.elements, tip_mass, tip_inertia, self.A, self.B = layout.numbers(key, self.exact)
         self._rows: dict[int, tuple[SolutionRow, ...]] = {}
@@ -132,9 +136,9 @@ class Sweep:
         p = _end_plane(*self._end(tip_mass), *self._end(tip_inertia))
         for each in self.elements:
             if isinstance(each, Mark):
-                self.planes[each.place] = self._at_mark(p)
+                self.planes[each.place] = self._plane_at_mark(p)
             else:
-                p = self._inside(each, p)
+                p = self._plane_inside(each, p)
         self.theta, self.M, self.Q = p[:3]
 
     @cached_property
@@ -159,10 +163,13 @@ class Sweep:
         """W, Psi, M and Q at each mark."""
         one = self.exact(1) + 0 * self.s
         none = 0 * self.s
-        conditions = self.carried_out((one, none, none, none))
+        return self.states_under(self.carry_out((one, none, none, none)))
+
+    def states_under(self, conditions: dict[Place, SolutionRow]) -> dict[Place, SolutionRow]:
+        """Return the state of the plane at each mark that satisfies the condition there."""
         return {place: _met(f, self.planes[place]) for place, f in conditions.items()}
 
-    def carried_out(self, f: SolutionRow) -> dict[Place, SolutionRow]:
+    def carry_out(self, f: SolutionRow) -> dict[Place, SolutionRow]:
         """Return the condition f z = 0 of the axis at each mark."""
         found: dict[Place, SolutionRow] = {}
         for each in reversed(self.elements):
@@ -171,13 +178,15 @@ class Sweep:
             if isinstance(each, Mark):
                 found[each.place] = f
             else:
-                f = self._beyond(each, f)
+                f = self._row_beyond(each, f)
         return found
 
     def output(self, one: OutputFormula) -> Any:
         """Return an output of this response, in SI units."""
         value = self.numerator(one)
-        return value / (self.s * self.exact(one.C) + 1) if one.C else value
+        if one.C:
+            value = value / (self.s * self.exact(one.C) + 1)
+        return value
 
     def numerator(self, one: OutputFormula) -> Any:
         """Return an output times 1 + C s."""
@@ -192,30 +201,35 @@ class Sweep:
         return value * exact(one.unit)
 
     def _end(self, condition: Any) -> tuple[Any, Any]:
+        """Return the factors of motion and force in a condition at the tip."""
         rest, inertia, force = condition
         return self.S * inertia + rest, force
 
-    def _at_mark(self, p: SolutionPlane) -> SolutionPlane:
+    def _plane_at_mark(self, p: SolutionPlane) -> SolutionPlane:
+        """Return the plane in the scale that states at a mark have."""
         return p
 
-    def _inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
+    def _plane_inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
+        """Return the plane at the inner end of an element from that at its outer one."""
         if isinstance(element, Segment):
             return _across_rows(*self._transition(element), p)
         return _inside_element(KINDS[type(element)], element, self.s, self.S, p)
 
-    def _beyond(self, element: Any, f: SolutionRow) -> SolutionRow:
+    def _row_beyond(self, element: Any, f: SolutionRow) -> SolutionRow:
+        """Return the condition at the outer end of an element from that at its inner one."""
         if isinstance(element, Segment):
             return _row_across(*self._transition(element), f)
         return _beyond_element(KINDS[type(element)], element, self.s, self.S, f)
 
     def _transition(self, segment: Any) -> tuple[SolutionRow, ...]:
+        """Return the transition matrix of a segment, computed once."""
         if id(segment) not in self._rows:
             l = segment.length
             (over_d, z_sum, z_product) = self._sums(segment)
             F0, F1, F2, F3 = self._functions(z_sum, z_product)
             functions = F0 * (l * l * l), F1 * (l * l), F2 * l, F3
-            rows = _transition_rows(functions, self.S, over_d / segment.stiffness, segment.of_chain)
-            self._rows[id(segment)] = rows
+            over_EI = over_d / segment.stiffness
+            self._rows[id(segment)] = _transition_rows(functions, self.S, over_EI, segment.of_chain)
         return self._rows[id(segment)]
 
     def _sums(self, segment: Any) -> tuple[Any, Any, Any]:

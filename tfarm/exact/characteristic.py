@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from tfarm.arm import Law
 from tfarm.arrays import Complex, Real
 from tfarm.exact.balls import Ball, Sweep, across_waves, in_chain, point, rational, sum_series
-from tfarm.exact.layout import Layout, laid_out, readings
+from tfarm.exact.layout import Layout, lay_out, readings
 from tfarm.exact.outputs import Output
 from tfarm.exact.rationals import polynomials
 from tfarm.exact.system import Place, Segment, System
@@ -63,7 +63,8 @@ class LoopParts(NamedTuple):
 
 def characteristic(k: System, s: Complex, at_zero: int = 0) -> Analytic:
     """Return D(s)/s^at_zero of a system without a law and its derivative at s (1-D, complex), in float64."""
-    s = off_rest(s) if at_zero else s
+    if at_zero:
+        s = off_rest(s)
     here, slopes = free_slopes(k, [], s, 0.0)
     return deflate(here.drive, slopes.drive, here.scale, s, at_zero)
 
@@ -127,16 +128,17 @@ class WideSweep(Sweep):
     """The sweep at a Taylor series s; `phase` is the series of t1 + t2 of all fast segments."""
 
     def __init__(self, layout: Any, s: Series, shortest: float) -> None:
-        self._shortest, self.phase = shortest, 0 * s
+        self._shortest = shortest
+        self.phase = 0 * s
         super().__init__(layout, s)
 
-    def _inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
+    def _plane_inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
         if not isinstance(element, Segment):
-            return super()._inside(element, p)
+            return super()._plane_inside(element, p)
         _, z_sum, z_product = self._sums(element)
         # 6.0: |z1| + |z2| below which power series are used
         if abs(z_sum[0]).mid() + 2 * abs(z_product[0]).mid().sqrt() < 6.0:
-            return super()._inside(element, p)
+            return super()._plane_inside(element, p)
         S = self.S
         d = self.s * element.damping + 1
         pair = _waves(*element[:3], S, d, self._shortest)
@@ -148,7 +150,7 @@ class WideSweep(Sweep):
         self.phase = self.phase + pair[0][5] + pair[1][5]
         return tuple(part / unit for part in across_waves(one, two, gS, d, p))
 
-    def _at_mark(self, p: SolutionPlane) -> SolutionPlane:
+    def _plane_at_mark(self, p: SolutionPlane) -> SolutionPlane:
         grown = self.phase.exp()
         return tuple(each * grown for each in p)
 
@@ -156,8 +158,10 @@ class WideSweep(Sweep):
     def states(self) -> dict[Place, SolutionRow]:
         """W, Psi, M and Q at each mark, in the scale of the plane at the axis."""
         shrunk = (-self.phase).exp()
-        full = super().states
-        return {place: tuple(each * shrunk for each in state) for place, state in full.items()}
+        found: dict[Place, SolutionRow] = {}
+        for place, state in super().states.items():
+            found[place] = tuple(each * shrunk for each in state)
+        return found
 
     def _functions(self, z_sum: Series, z_product: Series) -> tuple[Series, ...]:
         """Return F0..F3 as truncated power series, with the tail as a ball in every coefficient.
@@ -172,7 +176,8 @@ class WideSweep(Sweep):
         # each term is less than half of the one before
         if not q < count**2:
             raise InseparableError
-        ball = flint.acb(flint.arb(0, tail.upper()), flint.arb(0, tail.upper()))
+        part = flint.arb(0, tail.upper())
+        ball = flint.acb(part, part)
         terms_kept = z_sum.prec
         rest = flint.acb_series([ball] * terms_kept, prec=terms_kept)
         return tuple(total + rest for total in sum_series(z_sum, z_product, count))
@@ -194,7 +199,7 @@ class Feedback(NamedTuple):
 
 def characteristic_ball(k: System, s: Ball, law: Feedback | None = None) -> Ball:
     """Return D(s) enclosed, at the working precision: for points, at any s."""
-    return _fed_back(Sweep(_layout(k, law), s), law)
+    return _feed_back(Sweep(_layout(k, law), s), law)
 
 
 def characteristic_over(k: System, s: Ball, law: Feedback | None = None) -> Ball:
@@ -203,10 +208,15 @@ def characteristic_over(k: System, s: Ball, law: Feedback | None = None) -> Ball
     long_wave = 0.3
     # the power of the last Taylor term, the one over the wide ball
     middle = s.mid()
-    last = 0 if s.real.is_exact() and s.imag.is_exact() else 3
+    last = 3
+    if s.real.is_exact() and s.imag.is_exact():
+        last = 0
     try:
         here, scale = _by_waves(k, middle, law, None, long_wave, max(last, 1))
-        value = _by_waves(k, s, law, scale, long_wave, last + 1)[0][last] if last else here[0]
+        value = here[0]
+        if last:
+            over, _ = _by_waves(k, s, law, scale, long_wave, last + 1)
+            value = over[last]
     except InseparableError:
         return characteristic_ball(k, s, law)
     for order in reversed(range(last)):
@@ -233,26 +243,36 @@ def _by_waves(
     Raises InseparableError where waves may be one.
     """
     sweep = WideSweep(_layout(k, law), flint.acb_series([at, 1], prec=terms), shortest)
-    scale = sweep.phase[0] if scale is None else scale
-    return _fed_back(sweep, law) * (sweep.phase - scale).exp(), scale
+    if scale is None:
+        scale = sweep.phase[0]
+    return _feed_back(sweep, law) * (sweep.phase - scale).exp(), scale
 
 
 def _layout(k: System, law: Feedback | None) -> Layout:
     """Return the layout of a system with the signals of a law."""
-    return readings(k) if law is None else law.read
+    if law is None:
+        return readings(k)
+    return law.read
 
 
-def _fed_back(sweep: Sweep, law: Feedback | None) -> Any:
+def _feed_back(sweep: Sweep, law: Feedback | None) -> Any:
     """Return drive q + e^{-s tau} sum of p_i numerator_i of a sweep, for balls and for series."""
     if law is None:
         return sweep.input
     s = sweep.s
-    whole, *entries = (  # polynomials at s, by Horner's rule
-        reduce(lambda value, each: value * s + flint.arb(each), reversed(polynomial.coeffs()), 0 * s)
-        for polynomial in (law.whole, *law.entries)
-    )
-    fed = sum((p * sweep.output(one) for p, one in zip(entries, law.read.each, strict=True)), 0 * s)
-    return sweep.input * whole + (s * rational(-law.delay)).exp() * fed
+    fed = 0 * s
+    for p, one in zip(law.entries, law.read.each, strict=True):
+        fed = fed + _polynomial_at(p, s) * sweep.output(one)
+    delay = (s * rational(-law.delay)).exp()
+    return sweep.input * _polynomial_at(law.whole, s) + delay * fed
+
+
+def _polynomial_at(polynomial: Polynomial, s: Any) -> Any:
+    """Return the value of a polynomial at s, by Horner's rule."""
+    value = 0 * s
+    for each in reversed(polynomial.coeffs()):
+        value = value * s + flint.arb(each)
+    return value
 
 
 def feedback(k: System, law: Law, outputs: Sequence[Output], shares: Sequence[float]) -> Feedback:
@@ -265,10 +285,9 @@ def feedback(k: System, law: Law, outputs: Sequence[Output], shares: Sequence[fl
             if name in entries:
                 entries[name] += num * others
     used = [n for n, each in enumerate(entries.values()) if each]
-    read = laid_out(k, [outputs[n] for n in used], [shares[n] for n in used])
-    return Feedback(
-        read, _product(den for _, den in blocks), tuple(filter(None, entries.values())), law.delay
-    )
+    read = lay_out(k, [outputs[n] for n in used], [shares[n] for n in used])
+    whole = _product(den for _, den in blocks)
+    return Feedback(read, whole, tuple(filter(None, entries.values())), law.delay)
 
 
 def _product(factors: Iterable[Polynomial]) -> Polynomial:
@@ -294,8 +313,14 @@ def _nonzero(series: Series) -> Series:
 
 def _root(z: Series) -> Series:
     """Return a square root with its cut away from the ball, of either sign.  Raises InseparableError."""
-    root = _nonzero(z).sqrt() if z[0].real.mid() >= 0 else (-_nonzero(z)).sqrt() * point(1j)
-    return root if root[0].real.mid() >= 0 else -root
+    z = _nonzero(z)
+    if z[0].real.mid() >= 0:
+        root = z.sqrt()
+    else:
+        root = (-z).sqrt() * point(1j)
+    if root[0].real.mid() >= 0:
+        return root
+    return -root
 
 
 def _wave(z: Series, S: Series, d: Series, a: Ball, b: Ball, g: Ball, shortest: float) -> tuple[Series, ...]:
@@ -310,5 +335,6 @@ def _wave(z: Series, S: Series, d: Series, a: Ball, b: Ball, g: Ball, shortest: 
     if not inverse[0].contains(0):
         # the same by the dispersion relation; the narrower of the two
         other = -(S * g) / inverse
-        v = other if other[0].rel_accuracy_bits() > v[0].rel_accuracy_bits() else v
+        if other[0].rel_accuracy_bits() > v[0].rel_accuracy_bits():
+            v = other
     return (e * e + 1) / 2, (-(e * e) + 1) / (t * 2), z, v, e, t

@@ -23,11 +23,9 @@ from numba.core.types.misc import unliteral
 from numba.np import linalg
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
-_HERE = Path(__file__).parent
-OPTIONS = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
 
 
-class _Kept(FunctionCache):  # type: ignore[misc]  # numba comes without types
+class _KernelCache(FunctionCache):  # type: ignore[misc]  # numba comes without types
     """Kernels on disk, loaded without numba's tables of every function it knows, which only compiling reads."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -42,19 +40,19 @@ def compiled(function: _Kernel) -> _Kernel:
 
     Its cache is below the user's cache folder of numba, or else below this room.
     """
-    kernel = _without_literals(njit(**OPTIONS)(function))
+    kernel = _kernel_of(function, is_inlined=False)
     parent = config.CACHE_DIR
     config.CACHE_DIR = str(_CACHE)
     # no folder for the cache can be written
     with suppress(RuntimeError, OSError):
-        kernel._cache = _Kept(function)
+        kernel._cache = _KernelCache(function)
     config.CACHE_DIR = parent
     return kernel
 
 
 def inlined(function: _Kernel) -> _Kernel:
     """Return a function compiled and inlined into the kernels that call it, so that loops over it vectorise."""
-    kernel = _without_literals(njit(forceinline=True, no_cpython_wrapper=True, **OPTIONS)(function))
+    kernel = _kernel_of(function, is_inlined=True)
     # what Python would call: a null pointer
     kernel._insert = lambda *_: None
     kernel._compile_for_args = _refuse
@@ -62,11 +60,23 @@ def inlined(function: _Kernel) -> _Kernel:
 
 
 def _refuse(*_: Any) -> None:
+    """Raise TypeError, in the place of a call from Python."""
     raise TypeError("an inlined kernel is called by kernels alone; python_of(it) is for Python")
 
 
-def _without_literals(kernel: Any) -> Any:
-    """Return a kernel that others call with the type of a constant: numba would compile it anew for each value."""
+def _kernel_of(function: _Kernel, is_inlined: bool) -> Any:
+    """Return the kernel of a function; others call it with the type of a constant.
+
+    Numba itself would compile it anew for each value.
+    """
+    jit = njit(
+        error_model="numpy",
+        nogil=True,
+        no_cfunc_wrapper=True,
+        forceinline=is_inlined,
+        no_cpython_wrapper=is_inlined,
+    )
+    kernel: Any = jit(function)
     template_for = kernel.get_call_template
     kernel.get_call_template = lambda args, kws: template_for([unliteral(each) for each in args], kws)
     return kernel
@@ -84,17 +94,19 @@ def python_of(function: Any) -> Callable[..., Any]:
     return FunctionType(python.__code__, python.__globals__ | replaced, python.__name__)
 
 
-def _source_hash() -> str:
-    """Return the hash of all sources of compiled code."""
+def _cache_folder() -> Path:
+    """Return the folder of the kernels, named by a hash of all sources of compiled code."""
+    here = Path(__file__).parent
     digest = hashlib.sha256()
-    for source in sorted(_HERE.parent.rglob("*.py")):
+    for source in sorted(here.parent.rglob("*.py")):
         text = source.read_bytes()
-        if b"import python_of\n" not in text and (source.parent == _HERE or b"exact.compiled import" in text):
+        has_kernels = source.parent == here or b"exact.compiled import" in text
+        if has_kernels and b"import python_of\n" not in text:
             digest.update(text)
-    return digest.hexdigest()[:16]
+    return Path(config.CACHE_DIR or here / "__pycache__") / f"tfarm-{digest.hexdigest()[:16]}"
 
 
-_CACHE = Path(config.CACHE_DIR or _HERE / "__pycache__") / f"tfarm-{_source_hash()}"
+_CACHE = _cache_folder()
 
 
 class _FirstUse(event.Listener):  # type: ignore[misc]  # numba comes without types
@@ -113,7 +125,8 @@ class _FirstUse(event.Listener):  # type: ignore[misc]  # numba comes without ty
 event.register("numba:compile", _FirstUse())
 # At their import numba's functions of arrays look for a BLAS by loading scipy.linalg, a tenth of a short command.  No
 # kernel calls it, and where one did, numba would look again as it compiles it.
-_look_for_blas, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+_look_for_blas = linalg.ensure_blas
+linalg.ensure_blas = lambda: None
 import_module("numba.np.arraymath")
 linalg.ensure_blas = _look_for_blas
 

@@ -46,7 +46,7 @@ def rows_to_count(layout: Layout) -> tuple[NDArray[np.void], Real]:
 
 
 @inlined
-def _clamped(number: int, value: float, step: int) -> int:
+def _match_parity(number: int, value: float, step: int) -> int:
     """Return the count, changed by `step` where its parity differs from the sign of the determinant."""
     return number + step * ((number % 2 == 1) != (value < 0.0))
 
@@ -63,20 +63,20 @@ def chain_count(omega: float, rows: Any, ends: Any) -> int:
     for i in range(len(rows)):
         row = rows[i]
         if row.kind == SEGMENT:
-            number, p = _joined(number, omega, row, p, free)
+            number, p = _join_segment(number, omega, row, p, free)
             free = 2
         else:
             p = inside(row.kind, row, 0.0, S, p)
         if row.kind == SPRING:
-            number = _clamped(number, p[0], 1)
+            number = _match_parity(number, p[0], 1)
     if ends[OF_MOMENT] == 0.0:
         return number
     drive = (ends[OF_ANGLE] + S * ends[OF_ANGLE + 2]) * p[0] - ends[OF_MOMENT] * p[1]
-    return _clamped(number, drive, 1)
+    return _match_parity(number, drive, 1)
 
 
 @inlined
-def _joined(
+def _join_segment(
     outside: int, omega: float, row: Any, plane: SolutionPlane, free: int
 ) -> tuple[int, SolutionPlane]:
     """Return the count with one more segment, clamped at its inner end, and the plane carried across it.
@@ -86,7 +86,8 @@ def _joined(
     # W = Psi = 0
     clamped = (0.0, 0.0, 0.0, 0.0, 1.0)
     (s, _, _), (z1, v1, t1, dt1), (z2, v2, t2, dt2) = dispersion(complex(0.0, omega), row)
-    number = half_waves(z1, t1, dt1) + half_waves(z2, t2, dt2) + (z1.real < 0.0 and z2.real < 0.0)
+    travel_both = z1.real < 0.0 and z2.real < 0.0
+    number = half_waves(z1, t1, dt1) + half_waves(z2, t2, dt2) + travel_both
     S = s.real
     z1 = z1.real
     z2 = z2.real
@@ -106,11 +107,13 @@ def _joined(
         q = scale_plane(across_waves(one, two, gS, EI, plane), unit)
         r = scale_plane(across_waves(one, two, gS, EI, clamped), unit)
     # r at the outer end is, up to signs, the plane carried inwards (symmetry)
-    number = _clamped(number, r[1], -1)
-    number = _clamped(number, -r[0], -1) + outside
+    number = _match_parity(number, r[1], -1)
+    number = _match_parity(number, -r[0], -1) + outside
     if free == 2:
-        number = _clamped(number, -r[0] * plane[3] - r[3] * plane[0], 1)
-    return (_clamped(number, q[0], 1) if free else number), q
+        number = _match_parity(number, -r[0] * plane[3] - r[3] * plane[0], 1)
+    if free:
+        number = _match_parity(number, q[0], 1)
+    return number, q
 
 
 @compiled
@@ -137,7 +140,9 @@ def list_steps(first: Any, last: int, rows: Any, starts: Any, ends: Any, estimat
         while doubled < DOUBLINGS and chain_count(above, own, ends[j]) < last:
             above = 2.0 * above
             doubled = doubled + 1
-        for number in range(first[j], last + 1 if doubled < DOUBLINGS else 0):
+        if doubled == DOUBLINGS:
+            continue
+        for number in range(first[j], last + 1):
             low = 0.0
             high = above
             while True:

@@ -1,6 +1,7 @@
 """Layouts of a system: cut and marked at places, as rows of the kernel, with the weights of each output."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from enum import IntEnum
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -12,16 +13,14 @@ from tfarm.arrays import Real
 from tfarm.errors import require
 from tfarm.exact.outputs import Output
 from tfarm.exact.system import (
-    INNER,
     ONE,
-    OUTER,
-    PAYLOAD,
     ZERO,
     Body,
     Element,
     Mark,
     Offset,
     Place,
+    PlaceOrder,
     Segment,
     Spring,
     System,
@@ -44,10 +43,14 @@ AT_JOINT = 2.0**-50
 OF_ANGLE = 6
 OF_MOMENT = 10
 
-# the fields of a state
-W, PSI, M, Q = range(4)
-# of each quantity
-FIELDS = {"W": W, "Y": W, "centre": W, "Psi": PSI, "Phi": PSI, "M": M, "strain": M, "Q": Q}
+
+class Field(IntEnum):
+    """The fields of a state, W, Psi, M and Q, and by the names of other quantities the field that they are of."""
+
+    W = Y = centre = 0
+    Psi = Phi = 1
+    M = strain = 2
+    Q = 3
 
 
 class OutputFormula(NamedTuple):
@@ -75,15 +78,18 @@ class Layout:
     def __init__(
         self, chain: System, places: tuple[Place, ...] = (), each: tuple[OutputFormula, ...] = ()
     ) -> None:
-        self.chain, self.places, self.each = chain, places, each
+        self.chain = chain
+        self.places = places
+        self.each = each
         elements = list(elements_with_places(chain.elements))
         joints = [position for position, _, each in elements if isinstance(each, Segment)] + [ZERO]
-        order = {"payload": PAYLOAD, "outer": OUTER, "inner": INNER}
         marks = []
         for place in places:
             away = [abs(joint - place.share) for joint in joints]
-            share = joints[away.index(min(away))] if min(away) <= AT_JOINT else place.share
-            marks.append((share, order[place.side], Mark(place)))
+            share = place.share
+            if min(away) <= AT_JOINT:
+                share = joints[away.index(min(away))]
+            marks.append((share, PlaceOrder[place.side], Mark(place)))
         self.elements = cut_segments([*marks, *elements])
         self._numbers: dict[Any, list[Any]] = {}
 
@@ -93,12 +99,12 @@ class Layout:
         They are cached for each `key`.
         """
         if key not in self._numbers:
-            elements = [
-                each
-                if isinstance(each, Mark)
-                else type(each)._make(n if n is None else exact(n) for n in each)
-                for each in self.elements
-            ]
+            elements: list[Any] = []
+            for each in self.elements:
+                if isinstance(each, Mark):
+                    elements.append(each)
+                else:
+                    elements.append(type(each)._make(n if n is None else exact(n) for n in each))
             self._numbers[key] = [elements, *(tuple(map(exact, each)) for each in self._conditions)]
         return self._numbers[key]
 
@@ -106,7 +112,7 @@ class Layout:
     def _conditions(self) -> tuple[tuple[Fraction, ...], ...]:
         """Both tip conditions, A_0..A_3, and B_0 and B_1."""
         chain = self.chain
-        drive = self.chain.drive
+        drive = chain.drive
         return (
             end_condition(chain.tip_mass),
             end_condition(chain.tip_inertia),
@@ -155,17 +161,22 @@ def segment_at(chain: System, place: Place) -> Segment:
     inner_end = ONE
     for each in chain.segments:
         inner_end -= each.length
-        if place.share > inner_end + AT_JOINT or (
-            place.side == "outer" and place.share >= inner_end - AT_JOINT
-        ):
+        is_at_joint = place.side == "outer" and place.share >= inner_end - AT_JOINT
+        if is_at_joint or place.share > inner_end + AT_JOINT:
             break
     return each
 
 
 def unit_scale(wanted: Output, k: System) -> Fraction:
     """Return the SI value of one dimensionless unit of the output for 1 N m of torque, or 1 rad of a locked hub."""
-    units = {**dict.fromkeys(("W", "Y", "centre"), k.length), "M": k.EI / k.length, "Q": k.EI / k.length**2}
-    return units.get(wanted.quantity, ONE) / k.drive.unit
+    unit = ONE
+    if wanted.quantity in ("W", "Y", "centre"):
+        unit = k.length
+    elif wanted.quantity == "M":
+        unit = k.EI / k.length
+    elif wanted.quantity == "Q":
+        unit = k.EI / k.length**2
+    return unit / k.drive.unit
 
 
 def reading_of(chain: System, wanted: Output, x: float) -> OutputFormula:
@@ -193,21 +204,24 @@ def reading_of(chain: System, wanted: Output, x: float) -> OutputFormula:
         remedy = 'a "general" section has no depth: give rectangle, round or tube'
         require(segment.half_depth is not None, "link.section.shape", "general", remedy)
         unit = Fraction(segment.half_depth or 0) / chain.length / segment.stiffness / drive.unit
-    theta = {"Y": -(chain.radius + share), "Phi": Fraction(-1)}.get(wanted.quantity, ZERO)
-    return OutputFormula(
-        place, FIELDS[wanted.quantity], theta, wanted.power, unit, segment.damping if wanted.gauge else 0.0
-    )
+    theta = ZERO
+    if wanted.quantity == "Y":
+        theta = -(chain.radius + share)
+    elif wanted.quantity == "Phi":
+        theta = -ONE
+    C = segment.damping if wanted.gauge else 0.0
+    return OutputFormula(place, Field[wanted.quantity], theta, wanted.power, unit, C)
 
 
 def readings(chain: System, wanted: Iterable[Output] = (), x: float = 0.0) -> Layout:
-    """Return the outputs of a chain, laid out and cached with it."""
+    """Return the layout of outputs of a chain, cached with it."""
     outputs = tuple(wanted)
-    layout: Layout = chain.keep((outputs, x), lambda: laid_out(chain, outputs, [x] * len(outputs)))
+    layout: Layout = chain.keep((outputs, x), lambda: lay_out(chain, outputs, [x] * len(outputs)))
     return layout
 
 
-def laid_out(chain: System, wanted: Sequence[Output], shares: Sequence[float]) -> Layout:
-    """Return outputs of a chain, each with its share of the length, laid out."""
+def lay_out(chain: System, wanted: Sequence[Output], shares: Sequence[float]) -> Layout:
+    """Return the layout of outputs of a chain, each with its share of the length."""
     each = tuple(reading_of(chain, one, x) for one, x in zip(wanted, shares, strict=True))
     places = tuple(dict.fromkeys(one.place for one in each if one.place is not None))
     return Layout(chain, places, each)

@@ -17,16 +17,14 @@ from typing import Any, NamedTuple
 
 from tfarm.errors import ParameterError, require
 from tfarm.exact.balls import Ball, Sweep, point, rational
-from tfarm.exact.compiled import python_of
-from tfarm.exact.layout import Layout, M, OutputFormula, Q, reading_of
+from tfarm.exact.layout import Field, Layout, OutputFormula, reading_of
 from tfarm.exact.outputs import Output
 from tfarm.exact.system import Place, Spring, System
 from tfarm.exact.values import PROVEN_BITS, accurate_ball, certify_by_precision
-from tfarm.exact.waves import SolutionRow, met
+from tfarm.exact.waves import SolutionRow
 
-_met = python_of(met)
 # unit, entry of the state, its jumps
-LOAD_KINDS = {"force": ("N", Q, (1,)), "moment_pair": ("N m", M, (-1, 1))}
+LOAD_KINDS = {"force": ("N", Field.Q, (1,)), "moment_pair": ("N m", Field.M, (-1, 1))}
 
 
 class Load(NamedTuple):
@@ -71,7 +69,9 @@ def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float
     (_, jump, signs) = LOAD_KINDS[load.kind]
     require(not one.input, "output", wanted.name, "needs an input at the hub instead of a load")
     # of the dimensionless load
-    unit = (chain.length / chain.EI) * (chain.length if jump == Q else 1)
+    unit = chain.length / chain.EI
+    if jump == Field.Q:
+        unit = unit * chain.length
     loads = [Place(Fraction(share)) for share in load.shares]
     layouts = [Layout(chain, tuple(dict.fromkeys((at, one.place or at)))) for at in loads]
 
@@ -80,7 +80,9 @@ def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float
         value = sum(sign * _Loaded(layout, point(s)).quantity(one, at, jump) for sign, layout, at in parts)
         value = value * point(s) ** one.power / (1 + rational(one.C) * point(s))
         value = value * rational(one.unit * chain.drive.unit * unit)
-        return accurate_ball(value, PROVEN_BITS) if value.is_finite() else None
+        if not value.is_finite():
+            return None
+        return accurate_ball(value, PROVEN_BITS)
 
     return certify_by_precision(PROVEN_BITS, attempt, f"{PROVEN_BITS} bits", s)
 
@@ -88,9 +90,9 @@ def loaded_value(chain: System, load: Load, wanted: Output, s: complex, x: float
 class _Loaded(Sweep):
     """The sweep with marks at a load and at the place of an output."""
 
-    def _beyond(self, element: Any, f: SolutionRow) -> SolutionRow:
+    def _row_beyond(self, element: Any, f: SolutionRow) -> SolutionRow:
         """Return the condition beyond an element, beyond a spring not times its stiffness."""
-        f = super()._beyond(element, f)
+        f = super()._row_beyond(element, f)
         if isinstance(element, Spring):
             stiffness = self.s * element.damping + element.stiffness
             return tuple(each / stiffness for each in f)
@@ -100,22 +102,26 @@ class _Loaded(Sweep):
         """Return theta and field of a reading for a unit jump of an entry of the state at the load."""
         none = 0 * self.s
         whole = 1 + 0 * self.s
-        f, g = (
-            self.carried_out(at)
-            for at in ((whole, none, none, none), (none, self.of_angle, -self.of_moment, none))
-        )
-        F, G = ({at: _met(row, self.planes[at]) for at, row in rows.items()} for rows in (f, g))
-        # 0 at an eigenvalue
-        balance = {at: sum(a * b for a, b in zip(g[at], F[at], strict=True)) for at in f}
+        f = self.carry_out((whole, none, none, none))
+        g = self.carry_out((none, self.of_angle, -self.of_moment, none))
+        F = self.states_under(f)
+        G = self.states_under(g)
+
+        def balance(at: Place) -> Ball:
+            """Return g F at a mark: 0 at an eigenvalue."""
+            return sum(a * b for a, b in zip(g[at], F[at], strict=True))
+
         # w(F, e) and w(G, e)
-        by_F = F[load][Q - jump] / balance[load]
-        by_G = G[load][Q - jump] / balance[load]
+        by_F = F[load][Field.Q - jump] / balance(load)
+        by_G = G[load][Field.Q - jump] / balance(load)
         value = by_F * self.of_moment * rational(one.theta)
         if one.place is None:
             return value
         at = one.place
         n = one.field
         if self.layout.marks[at] > self.layout.marks[load]:
-            dual = by_G * f[at][Q - n] - by_F * g[at][Q - n]
-            return value + (dual if n < M else -dual)
-        return value - (g[load][jump] * F[at][n] - f[load][jump] * G[at][n]) / balance[at]
+            dual = by_G * f[at][Field.Q - n] - by_F * g[at][Field.Q - n]
+            if n in (Field.W, Field.Psi):
+                return value + dual
+            return value - dual
+        return value - (g[load][jump] * F[at][n] - f[load][jump] * G[at][n]) / balance(at)

@@ -1,15 +1,17 @@
 """The outputs of the arm: a power of s times one quantity of the exact solution, at the hub, at the tip or at x.
 
-A new power of s or place is one row of `OUTPUTS`.  A new quantity has here its places, its unit and whether the
-appendix has it, and in `reading_of` (`layout`) its weights of W, Psi, M and Q.  Signs as in the paper: root moment
-E I phi'(0), shear force kappa G A (w' - psi).
+A new power of s or place is one row of `outputs.toml`.  A new quantity has there its places and its unit, here its
+letter and whether the appendix has it, and in `reading_of` (`layout`) its weights of W, Psi, M and Q.  Signs as in the
+paper: root moment E I phi'(0), shear force kappa G A (w' - psi).
 """
 
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import Literal, get_args
 
@@ -24,20 +26,10 @@ OutputPlace = Literal["root", "tip", "x"]
 # of a joint of two segments, or of an attachment
 Side = Literal["outer", "inner"]
 
+_TABLES = tomllib.loads((Path(__file__).parent / "outputs.toml").read_text(encoding="utf-8"))
 # SI unit of each quantity, and the places where it is known
 QUANTITIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "theta": ("rad", "root"),
-        "M": ("N m", "root", "tip", "x"),
-        "Q": ("N", "root", "tip", "x"),
-        "W": ("m", "tip", "x"),
-        "Y": ("m", "tip", "x"),
-        "Phi": ("rad", "tip", "x"),
-        "Psi": ("rad", "tip", "x"),
-        "strain": ("1", "x"),
-        "centre": ("m", "tip"),
-        "current": ("A", "root"),
-    }
+    {name: (each["unit"], *each["places"]) for name, each in _TABLES["quantity"].items()}
 )
 
 
@@ -82,7 +74,10 @@ class Output:
         is_gauge = isinstance(self.gauge, bool) and (not self.gauge or self.quantity in ("M", "strain"))
         remedy = "true or false, true for a moment only: a strain gauge measures E I phi' without its damping"
         require(is_gauge, "output.gauge", self.gauge, remedy)
-        unit += "" if self.power == 0 else "/s" if self.power == 1 else f"/s^{self.power}"
+        if self.power == 1:
+            unit += "/s"
+        elif self.power:
+            unit += f"/s^{self.power}"
         require(self.unit in ("", unit), "output.unit", self.unit, f'values are in SI units, here "{unit}"')
         object.__setattr__(self, "unit", unit)
 
@@ -90,9 +85,8 @@ class Output:
     def is_in_appendix(self) -> bool:
         """Whether the paper's appendix has it."""
         along = self.quantity == "W" and self.place == "x"
-        return (
-            not along and self.quantity not in ("Psi", "strain", "centre", "current") and self.side == "outer"
-        )
+        is_of_rig = self.side == "inner" or self.quantity in ("Psi", "strain", "centre", "current")
+        return not (along or is_of_rig)
 
     @property
     def base(self) -> Output:
@@ -104,33 +98,13 @@ class Output:
         return {"root": 0.0, "tip": 1.0, "x": x}[self.place]
 
 
-OUTPUTS: Mapping[str, Output] = MappingProxyType(
-    {
-        each.name: each
-        for each in (
-            Output(quantity="theta", place="root", label="hub angle"),
-            Output(quantity="theta", place="root", power=1, label="hub rate"),
-            Output(quantity="W", place="tip", label="tip displacement"),
-            Output(quantity="Y", place="tip", label="tip deflection"),
-            Output(quantity="W", place="tip", power=2, label="tip acceleration"),
-            Output(quantity="M", place="root", gauge=True, label="root moment"),
-            Output(name="root_shear", quantity="Q", place="root", label="root shear force"),
-            Output(quantity="current", place="root", label="motor current"),
-            Output(quantity="Phi", place="tip", label="tip rotation"),
-            Output(name="tip_angle", quantity="Psi", place="tip", label="tip angle in space"),
-            Output(quantity="centre", place="tip", label="payload displacement"),
-            Output(name="displacement", quantity="W", place="x", label="displacement at x"),
-            Output(name="velocity", quantity="W", place="x", power=1, label="velocity at x"),
-            Output(name="acceleration", quantity="W", place="x", power=2, label="acceleration at x"),
-            Output(name="deflection", quantity="Y", place="x", label="deflection at x"),
-            Output(name="rotation", quantity="Phi", place="x", label="rotation at x"),
-            Output(name="moment", quantity="M", place="x", gauge=True, label="bending moment at x"),
-            Output(name="full_moment", quantity="M", place="x", label="bending moment with damping at x"),
-            Output(name="strain", quantity="strain", place="x", gauge=True, label="bending strain at x"),
-            Output(name="shear", quantity="Q", place="x", label="shear force at x"),
-        )
-    }
-)
+def _named_outputs() -> dict[str, Output]:
+    """Return the outputs of the table by their names."""
+    rows = [Output(**row) for row in _TABLES["output"]]
+    return {each.name: each for each in rows}
+
+
+OUTPUTS: Mapping[str, Output] = MappingProxyType(_named_outputs())
 
 
 def output(wanted: str | Output) -> Output:
@@ -159,14 +133,19 @@ def on_side(wanted: str | Output, side: Side) -> Output:
 
 
 def signal_words(name: str) -> tuple[str, str]:
-    """Label and SI unit of an output or input, with its place: ("bending strain at x = 0.05 m", "1")."""
+    """Return label and SI unit of an output or input, with its place: ("bending strain at x = 0.05 m", "1")."""
     plain, _, place = name.partition("@")
     if plain not in OUTPUTS:
         return plain.replace("_", " "), INPUT_UNITS[plain]
-    label = OUTPUTS[plain].label
-    return f"{label} = {place} m" if place else label, OUTPUTS[plain].unit
+    found = OUTPUTS[plain]
+    label = found.label
+    if place:
+        label = f"{label} = {place} m"
+    return label, found.unit
 
 
 def unit_over(above: str, below: str) -> str:
-    """The unit of a quantity in one unit over one in another: m/s^2/(N m)."""
-    return f"{above}/{f'({below})' if ' ' in below or '/' in below else below}"
+    """Return the unit of a quantity in one unit over one in another: m/s^2/(N m)."""
+    if " " in below or "/" in below:
+        below = f"({below})"
+    return f"{above}/{below}"

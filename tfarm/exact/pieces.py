@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from tfarm.arrays import Complex
 from tfarm.exact.compiled import inlined
 from tfarm.exact.waves import (
-    PARALLEL,
     SolutionPlane,
     SolutionRow,
     Wave,
@@ -43,7 +42,6 @@ LIFT, TURN, PLANE_SIZE = (BLOCK * j for j in (4, 5, 6))
 S_SQUARED, ONE, TWO, SERIES, WAVES_SIZE = (BLOCK * j for j in (0, 3, 11, 19, 25))
 # of a wave
 FUNCTIONS, PHASE = (BLOCK * j for j in (4, 7))
-F1, F2_LESS_1, F3_LESS_1 = (SERIES + BLOCK * j for j in (1, 4, 5))
 
 
 class BlockBuffers(NamedTuple):
@@ -104,6 +102,8 @@ def cross(points: Any, row: Any, j: int, work: BlockBuffers, lost: Any) -> None:
 
     Scales are added to `work.scale`, lost digits are marked.
     """
+    # |z_1 - z_2| below this share of |z_1| + |z_2| loses digits
+    parallel = 0.15
     outer = work.planes[j]
     inner = work.planes[j + 1]
     waves = work.waves[j]
@@ -117,22 +117,20 @@ def cross(points: Any, row: Any, j: int, work: BlockBuffers, lost: Any) -> None:
         for i in range(BLOCK):
             one, two, gS, d = waves_at(row, waves, i)
             gap = one[2] - two[2]
-            write_point(
-                inner,
-                i,
-                scale_plane(
-                    across_waves(one, two, gS, d, plane_at(outer, i)), reciprocal(gS * d * gap * gap)
-                ),
-            )
+            unit = reciprocal(gS * d * gap * gap)
+            carried = across_waves(one, two, gS, d, plane_at(outer, i))
+            write_point(inner, i, scale_plane(carried, unit))
         for i in range(BLOCK):
             z1 = waves[ONE + i]
             z2 = waves[TWO + i]
             work.scale[i] += 0.0 if low[i] else waves[ONE + PHASE + i] + waves[TWO + PHASE + i]
-            lost[i] |= (not low[i]) & (magnitude(z1 - z2) < PARALLEL * (magnitude(z1) + magnitude(z2)))
+            is_parallel = magnitude(z1 - z2) < parallel * (magnitude(z1) + magnitude(z2))
+            lost[i] |= (not low[i]) & is_parallel
     if slow:
         _fill_series(points, row, waves)
         for i in range(BLOCK):
-            put_where(low[i], inner, i, across_rows(*rows_at(points[i], row, waves, i), plane_at(outer, i)))
+            W, Psi, M, Q = rows_at(points[i], row, waves, i)
+            put_where(low[i], inner, i, across_rows(W, Psi, M, Q, plane_at(outer, i)))
 
 
 @inlined
@@ -206,7 +204,8 @@ def cross_back(points: Any, row: Any, j: int, work: BlockBuffers, scale: Any) ->
             put_where(not low[i], back, i, (W * unit, Psi * unit, M * unit, Q * unit))
     if slow:
         for i in range(BLOCK):
-            put_where(low[i], back, i, row_across(*rows_at(points[i], row, waves, i), row_at(back, i)))
+            rows = rows_at(points[i], row, waves, i)
+            put_where(low[i], back, i, row_across(*rows, row_at(back, i)))
 
 
 @inlined
@@ -226,7 +225,8 @@ def _fade(waves: Any, low: Any, scale: Any) -> None:
             decay = math.exp(t_slow.real - t.real)
             turn = t_slow.imag - t.imag
             ratio = complex(decay * math.cos(turn), decay * math.sin(turn))
-        waves[slow], waves[slow + BLOCK] = c * ratio, s * ratio
+        waves[slow] = c * ratio
+        waves[slow + BLOCK] = s * ratio
         if not low[i]:
             scale[i] -= t_slow
 

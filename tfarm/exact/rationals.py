@@ -10,6 +10,7 @@ Zeros and poles in z of a block are in delta = z - 1:
 Each has an error of some last bits of delta, also in a cluster, and one at z = 1 is 0.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import flint
@@ -43,9 +44,6 @@ def falls(P: Matrix, A: Real) -> bool:
 
 # delta of z = -1, the image of s = infinity under Tustin's rule
 AT_MINUS_ONE = -2.0
-# of the first precision of a held block, which is doubled
-# of a coefficient of a held block: more than a double
-ENOUGH_BITS = 80
 
 # g and the zeros of g prod(delta - zeros)
 Gained = tuple[float, Complex]
@@ -59,15 +57,15 @@ def block_factors(block: LawBlock, rule: str, T: float, c: float) -> tuple[Compl
     nums, den = polynomials(block)
     if rule == "none":
         shift = flint.fmpq_poly([1, 1])
-        return _roots(den(shift)), [(_leading(num, den), _roots(num(shift))) for num in nums]
+        return _roots(den(shift)), [(_leading_ratio(num, den), _roots(num(shift))) for num in nums]
     s = _roots(den)
     if rule == "tustin":
-        most = max(den.degree(), *(num.degree() for num in nums))
+        most = max(each.degree() for each in (den, *nums))
         poles = np.r_[2 * s / (c - s), np.full(most - s.size, AT_MINUS_ONE)]
-        return poles, [_of_tustin(num, den, c, most) for num in nums]
+        return poles, [_tustin_zeros(num, den, c, most) for num in nums]
     if rule == "matched" or not block.order:
-        return np.expm1(s * T), [_of_matched(num, den, T) for num in nums]
-    return np.expm1(s * T), _of_held(nums, den, T)
+        return np.expm1(s * T), [_matched_zeros(num, den, T) for num in nums]
+    return np.expm1(s * T), _held_zeros(nums, den, T)
 
 
 # ------------------------------------------------------------ polynomials over the rationals
@@ -79,14 +77,20 @@ def polynomials(block: LawBlock) -> tuple[list[Any], Any]:
     Those of matrices are det(s - A + B_j C) + (D_j - 1) det(s - A) and det(s - A).
     """
     if isinstance(block, Rational):
-        num, den = (
-            flint.fmpq_poly([fraction(each) for each in reversed(of)]) for of in (block.num, block.den)
-        )
-        return [num], den
-    A, _, C, D = map(exact_matrix, block.matrices())
-    columns = [exact_matrix(column[:, None]) for column in block.matrices()[1].T]
+        return [_polynomial(block.num)], _polynomial(block.den)
+    matrices = block.matrices()
+    A, _, C, D = map(exact_matrix, matrices)
     den = A.charpoly()
-    return [(A - each * C).charpoly() + (D[0, j] - 1) * den for j, each in enumerate(columns)], den
+    nums = []
+    for j, column in enumerate(matrices[1].T):
+        B_j = exact_matrix(column[:, None])
+        nums.append((A - B_j * C).charpoly() + (D[0, j] - 1) * den)
+    return nums, den
+
+
+def _polynomial(coefficients: Sequence[float]) -> Any:
+    """Return the polynomial over the rationals with these coefficients, the leading one first."""
+    return flint.fmpq_poly([fraction(each) for each in reversed(coefficients)])
 
 
 def _zeros_at_0(polynomial: Any) -> int:
@@ -102,32 +106,37 @@ def _roots(polynomial: Any) -> Complex:
     return np.array(found, dtype=complex)
 
 
-def _leading(num: Any, den: Any) -> float:
+def _leading_ratio(num: Any, den: Any) -> float:
     """Return the ratio of the leading coefficients, whose parts may be larger than any double."""
-    ratio = num.leading_coefficient() / den.leading_coefficient() if num else flint.fmpq(0)
+    if not num:
+        return 0.0
+    ratio = num.leading_coefficient() / den.leading_coefficient()
     return int(ratio.p) / int(ratio.q)
 
 
 # ------------------------------------------------------------ rules
 
 
-def _of_tustin(num: Any, den: Any, c: float, most: int) -> Gained:
+def _tustin_zeros(num: Any, den: Any, c: float, most: int) -> Gained:
     """Return gain and zeros of num/den with s = c delta/(delta + 2), both times (delta + 2)^most.
 
     A zero at s = c, which is at z = infinity, is the factor -2 c/(delta + 2).
     """
     zeros = _roots(num)
     poles = _roots(den)
+    at_infinity = zeros == c
     # exact differences next to c
-    sizes = np.where(zeros == c, -2.0, (c - zeros) / c)
+    of_zeros = np.where(at_infinity, -2.0, (c - zeros) / c)
     of_poles = (c - poles) / c
-    gain = _leading(num, den) * np.prod(sizes) / np.prod(of_poles) * c ** (zeros.size - poles.size)
-    at_end = np.full(most - zeros.size, AT_MINUS_ONE) if num else np.empty(0)
-    zeros = zeros[zeros != c]
-    return float(gain.real), np.r_[2 * zeros / (c - zeros), at_end]
+    gain = _leading_ratio(num, den) * np.prod(of_zeros) / np.prod(of_poles) * c ** (zeros.size - poles.size)
+    finite = zeros[~at_infinity]
+    images = 2 * finite / (c - finite)
+    if num:
+        images = np.r_[images, np.full(most - zeros.size, AT_MINUS_ONE)]
+    return float(gain.real), images
 
 
-def _of_matched(num: Any, den: Any, T: float) -> Gained:
+def _matched_zeros(num: Any, den: Any, T: float) -> Gained:
     """Return gain and zeros with e^{rT} for every root r; at rest both agree, as powers of s and delta/T."""
     zeros = _roots(num)
     poles = _roots(den)
@@ -137,35 +146,40 @@ def _of_matched(num: Any, den: Any, T: float) -> Gained:
         x = roots[roots != 0] * T
         return complex(np.prod(np.expm1(x) / x))
 
-    gain = _leading(num, den) * growth(poles) / growth(zeros) * T ** (poles.size - zeros.size)
+    gain = _leading_ratio(num, den) * growth(poles) / growth(zeros) * T ** (poles.size - zeros.size)
     return float(gain.real), np.expm1(zeros * T)
 
 
-def _of_held(nums: list[Any], den: Any, T: float) -> list[Gained]:
+def _held_zeros(nums: list[Any], den: Any, T: float) -> list[Gained]:
     """Return gain and zeros of each signal behind a zero-order hold."""
     # of the first precision of a held block, which is doubled
     bits_a_state = 64
     spare_states = 8
     with precision(bits_a_state * (den.degree() + spare_states)):
         held = [_held_numerator(num, den, fraction(T)) for num in nums]
-    return [(_leading(each, flint.fmpq_poly([1])), _roots(each)) for each in held]
+    return [(_leading_ratio(each, flint.fmpq_poly([1])), _roots(each)) for each in held]
 
 
 def _held_numerator(num: Any, den: Any, T: Any) -> Any:
-    """Return the polynomial in delta of a signal, over the rationals, with coefficients of `ENOUGH_BITS`.
+    """Return the polynomial in delta of a signal, over the rationals, with coefficients of 80 bits.
 
     For a block without a value at rest it has a simple zero at delta = 0.
     """
+    # more than a double
+    enough_bits = 80
     # of the precision: a coefficient without digits by then is 0
     most_doublings = 5
-    known = min(_zeros_at_0(num), _zeros_at_0(den) + 1) if num else 0
+    known = 0
+    if num:
+        known = min(_zeros_at_0(num), _zeros_at_0(den) + 1)
     for _ in range(most_doublings):
         balls = _held_coefficients(num, den, T)[known:]
-        if not num or all(each.rel_accuracy_bits() >= ENOUGH_BITS for each in balls):
+        if not num or all(each.rel_accuracy_bits() >= enough_bits for each in balls):
             break
         flint.ctx.prec *= 2
     middles = [flint.fmpq(0) if each.contains(0) else exact_middle(each) for each in balls]
-    return flint.fmpq_poly([0] * known + middles + [num[den.degree()] / den.leading_coefficient()])
+    leading = num[den.degree()] / den.leading_coefficient()
+    return flint.fmpq_poly([*[0] * known, *middles, leading])
 
 
 def _held_coefficients(num: Any, den: Any, T: Any) -> list[Any]:
@@ -175,8 +189,9 @@ def _held_coefficients(num: Any, den: Any, T: Any) -> list[Any]:
     D = num[n] / first
     down = range(n - 1, -1, -1)
     C = [(num[k] - D * den[k]) / first for k in down]
+    first_row = [*(-den[k] * T / first for k in down), T]
     chain = [[T if k == i else 0 for k in range(n + 1)] for i in range(n - 1)]
-    both = flint.arb_mat([[*(-den[k] * T / first for k in down), T], *chain, [0] * (n + 1)]).exp().tolist()
+    both = flint.arb_mat([first_row, *chain, [0] * (n + 1)]).exp().tolist()
     less = flint.arb_mat([[both[i][k] - int(i == k) for k in range(n)] for i in range(n)])
     fed = flint.arb_mat([[both[i][n] * c for c in C] for i in range(n)])
     p = (less - fed).charpoly()

@@ -31,7 +31,10 @@ def rigid_response(arm: Arm, wanted: Output, s: Complex, x: float = 0.0) -> Comp
     layout = readings(system_of(arm), (wanted,), x)
     sweep = RigidSweep(layout)
     one = layout.each[0]
-    above, below = (each + 0 * sweep.s for each in (sweep.numerator(one), sweep.input))
+    # polynomials also where they are constant
+    none = 0 * sweep.s
+    above = sweep.numerator(one) + none
+    below = sweep.input + none
     if not below:
         return np.zeros(s.size, complex)
     with np.errstate(all="ignore"):
@@ -53,18 +56,18 @@ class RigidSweep(Sweep):
 
     exact = staticmethod(fraction)
 
-    def _inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
-        for each in _rigid(element):
-            p = super()._inside(each, p)
+    def _plane_inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
+        for each in _rigid_parts(element):
+            p = super()._plane_inside(each, p)
         return p
 
-    def _beyond(self, element: Any, f: SolutionRow) -> SolutionRow:
-        for each in _rigid(element):
-            f = super()._beyond(each, f)
+    def _row_beyond(self, element: Any, f: SolutionRow) -> SolutionRow:
+        for each in _rigid_parts(element):
+            f = super()._row_beyond(each, f)
         return f
 
 
-def _rigid(element: Any) -> tuple[Any, ...]:
+def _rigid_parts(element: Any) -> tuple[Any, ...]:
     """Return a segment as a rigid body between two halves of its length; any other element itself."""
     if not isinstance(element, Segment):
         return (element,)

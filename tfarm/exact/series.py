@@ -32,17 +32,18 @@ class SlowSweep(Sweep):
 @lru_cache(SERIES_KEPT)  # loops, models and pages need the same few of a rig
 def expansion_at_zero(chain: System, output: Output, x: float = 0.0) -> tuple[float, float, float, float]:
     """Return the coefficients of s^-2, s^-1, 1 and s in an output's expansion at s = 0."""
+    missing = 2 - _order(_series_at_zero(chain))
     coefficients = [float(c.mid()) for c in _quotient_at_zero(chain, output, x)]
-    padded = [0.0] * (2 - _leading(_at_zero(chain))) + coefficients
-    return padded[0], padded[1], padded[2], padded[3]
+    double_pole, pole, constant, slope, *_ = [0.0] * missing + coefficients
+    return double_pole, pole, constant, slope
 
 
 def _quotient_at_zero(chain: System, output: Output, x: float) -> list[Ball]:
     """Return the output's expansion from s^-n on, n the order of the drive's zero."""
-    drive = _at_zero(chain)
-    kept = SERIES_ORDER - _leading(drive)
+    drive = _series_at_zero(chain)
+    kept = SERIES_ORDER - _order(drive)
     with precision(SERIES_BITS):
-        of_output = flint.arb_series(_at_zero(chain, output, x)[:kept], prec=kept)
+        of_output = flint.arb_series(_series_at_zero(chain, output, x)[:kept], prec=kept)
         found = of_output / flint.arb_series(drive[-kept:], prec=kept)
         return [found[n] for n in range(kept)]
 
@@ -56,7 +57,7 @@ def constant_of(chain: System, wanted: Output, x: float) -> int | None:
     layout = readings(chain, (wanted.base,), x)
     (one,) = layout.each
     with precision(SERIES_BITS):
-        sweep = _swept(chain, layout.places)
+        sweep = _slow_sweep(chain, layout.places)
         unit = rational(one.unit)
         found = sweep.numerator(one)
         size = max(abs((sweep.input * unit)[n]) for n in range(SERIES_ORDER))
@@ -75,8 +76,8 @@ def without_slow_pole(chain: System, wanted: Sequence[Output], x: float) -> list
     """
     # of Newton's method for a pole next to 0, each doubling its digits
     slow_pole_steps = 8
-    drive = _at_zero(chain)
-    first = _leading(drive)
+    drive = _series_at_zero(chain)
+    first = _order(drive)
     with precision(SERIES_BITS):
         p: Ball = rational(0)
         D: Any = flint.arb_poly(drive[first:])
@@ -86,23 +87,27 @@ def without_slow_pole(chain: System, wanted: Sequence[Output], x: float) -> list
         found = []
         for each in wanted:
             constant, slope, *others, last = _quotient_at_zero(chain, each, x)[first:]
-            power = p ** (len(others) + 1)
-            found.append((float((constant - last * power * p).mid()), float((slope - last * power).mid())))
+            of_pole = last * p ** (len(others) + 1)
+            rest = constant - of_pole * p, slope - of_pole
+            found.append((float(rest[0].mid()), float(rest[1].mid())))
     return found
 
 
 def order_at_zero(chain: System, wanted: Output, x: float = 0.0) -> int:
     """Return the order of the zero of an output of the free response at s = 0."""
-    return _leading(_at_zero(chain, wanted, x))
+    return _order(_series_at_zero(chain, wanted, x))
 
 
 @lru_cache(SERIES_KEPT)
-def _at_zero(chain: System, wanted: Output | None = None, x: float = 0.0) -> list[Ball]:
+def _series_at_zero(chain: System, wanted: Output | None = None, x: float = 0.0) -> list[Ball]:
     """Return the power series at s = 0 of an output of the free response, else of the drive, with exact zeros."""
     layout = readings(chain, [wanted] if wanted else (), x)
     with precision(SERIES_BITS):
-        sweep = _swept(chain, layout.places)
-        series = sweep.input if wanted is None else sweep.output(layout.each[0])
+        sweep = _slow_sweep(chain, layout.places)
+        if wanted is None:
+            series = sweep.input
+        else:
+            series = sweep.output(layout.each[0])
         coefficients = [series[n] for n in range(SERIES_ORDER)]
         sizes = [abs(float(c.mid())) for c in coefficients]
         small = KNOWN_ZERO * max(sizes)
@@ -110,11 +115,11 @@ def _at_zero(chain: System, wanted: Output | None = None, x: float = 0.0) -> lis
 
 
 @lru_cache(SERIES_KEPT)  # one sweep has angle, rate and drive
-def _swept(chain: System, places: tuple[Place, ...]) -> SlowSweep:
+def _slow_sweep(chain: System, places: tuple[Place, ...]) -> SlowSweep:
     """Return the sweep of a chain marked at these places."""
     return SlowSweep(Layout(chain, places), flint.arb_series([0, 1], prec=SERIES_ORDER))
 
 
-def _leading(coefficients: Sequence[Ball]) -> int:
-    """Return the index of the first one that is not 0, or their number."""
+def _order(coefficients: Sequence[Ball]) -> int:
+    """Return the index of the first coefficient that is not 0, or their number."""
     return next((n for n, coefficient in enumerate(coefficients) if coefficient != 0), len(coefficients))

@@ -17,11 +17,9 @@ from tfarm.exact.compiled import compiled, inlined
 from tfarm.exact.layout import BODY, MARK, OF_ANGLE, OF_MOMENT, OFFSET, SEGMENT, SPRING
 from tfarm.exact.pieces import (
     BLOCK,
-    F1,
-    F2_LESS_1,
-    F3_LESS_1,
     LIFT,
     PLANE_SIZE,
+    SERIES,
     TURN,
     WAVES_SIZE,
     BlockBuffers,
@@ -81,7 +79,8 @@ def _sweep(points: Any, rows: Any, ends: Any, work: BlockBuffers, lost: Any) -> 
     ln_2 = math.log(2.0)
     for i in range(BLOCK):
         write_point(work.planes[0], i, end_plane(*tip_conditions(ends, points[i] * points[i])))
-        work.scale[i], lost[i] = 0.0, False
+        work.scale[i] = 0.0
+        lost[i] = False
     for j in range(len(rows)):
         row = rows[j]
         outer = work.planes[j]
@@ -96,10 +95,9 @@ def _sweep(points: Any, rows: Any, ends: Any, work: BlockBuffers, lost: Any) -> 
             continue
         else:
             for i in range(BLOCK):
-                write_point(
-                    inner, i, inside(row.kind, row, points[i], points[i] * points[i], plane_at(outer, i))
-                )
-        _brought_back(inner, 5, work.powers[j])
+                s = points[i]
+                write_point(inner, i, inside(row.kind, row, s, s * s, plane_at(outer, i)))
+        _rescale(inner, 5, work.powers[j])
         for i in range(BLOCK):
             work.scale[i] += work.powers[j, i] * ln_2
 
@@ -127,7 +125,7 @@ def carry_beyond(kind: int, row: Any, s: Number, S: Number, f: SolutionRow) -> S
 
 
 @inlined
-def _brought_back(buffer: Any, parts: int, powers: Any) -> None:
+def _rescale(buffer: Any, parts: int, powers: Any) -> None:
     """Divide each point's numbers by a power of two, added to `powers`, where they are near over- or underflow."""
     beyond = 0
     for i in range(BLOCK):
@@ -161,12 +159,14 @@ def _go_back(points: Any, rows: Any, outermost: int, work: BlockBuffers, differs
     for i in range(BLOCK):
         work.theta[i] = met(row_at(back, i), plane_at(axis, i))[1]
         # W = 0 on the axis, of a mode also where another condition determines it
-        back[LIFT + i] = back[TURN + i] = 0.0
+        back[LIFT + i] = 0.0
+        back[TURN + i] = 0.0
     for j in range(len(rows) - 1, outermost - 1, -1):
         row = rows[j]
         if row.kind == MARK:
             for i in range(BLOCK):
-                work.scales[j, i], work.shifts[j, i] = scale[i], shift[i]
+                work.scales[j, i] = scale[i]
+                work.shifts[j, i] = shift[i]
             _meet(work.planes[j + 1], work, is_root, reach, shift)
             continue
         if row.kind == SEGMENT:
@@ -176,11 +176,12 @@ def _go_back(points: Any, rows: Any, outermost: int, work: BlockBuffers, differs
             reach = reach + row.length
             is_root = False
         else:
-            _beyond(points, row, work.planes[j + 1], back, shift)
-            reach += row.length if row.kind == OFFSET else 0.0
+            _carry_rigid(points, row, work.planes[j + 1], back, shift)
+            if row.kind == OFFSET:
+                reach += row.length
         for i in range(BLOCK):
             shift[i] -= work.powers[j, i]
-        _brought_back(back, 4, shift)
+        _rescale(back, 4, shift)
 
 
 @inlined
@@ -198,11 +199,12 @@ def _meet(state: Any, work: BlockBuffers, is_root: bool, reach: float, shift: An
             # far up a spring at the root leaves of both next to nothing: the state itself has those digits
             if magnitude(lifted) >= 0.1 * magnitude(rigid):
                 state[i] = times(lifted, math.ldexp(1.0, -shift[i])) if shift[i] else lifted
-        state[LIFT + i], state[TURN + i] = back[LIFT + i], back[TURN + i]
+        state[LIFT + i] = back[LIFT + i]
+        state[TURN + i] = back[TURN + i]
 
 
 @inlined
-def _beyond(points: Any, row: Any, inner: Any, back: Any, shift: Any) -> None:
+def _carry_rigid(points: Any, row: Any, inner: Any, back: Any, shift: Any) -> None:
     """Compute condition, W - r theta and Psi - theta beyond an offset, a spring or a body, in place."""
     kind = row.kind
     for i in range(BLOCK):
@@ -239,10 +241,13 @@ def _beyond_segment(points: Any, row: Any, j: int, work: BlockBuffers, reach: fl
         Psi = work.theta[i] + turn
         of_W, of_Psi, _, _ = rows_at(points[i], row, waves, i)
         S = points[i] * points[i]
-        even = waves[F3_LESS_1 + i] - row.of_chain[0] * S * of_W[2]
-        odd = waves[F3_LESS_1 + i] - row.of_chain[1] * S * waves[F1 + i]
+        F1 = waves[SERIES + BLOCK + i]
+        F2_less_1 = waves[SERIES + 4 * BLOCK + i]
+        F3_less_1 = waves[SERIES + 5 * BLOCK + i]
+        even = F3_less_1 - row.of_chain[0] * S * of_W[2]
+        odd = F3_less_1 - row.of_chain[1] * S * F1
         lift += row.length * turn
-        back[LIFT + i] = lift + (even * W + waves[F2_LESS_1 + i] * Psi + of_W[2] * M - of_W[3] * Q)
+        back[LIFT + i] = lift + (even * W + F2_less_1 * Psi + of_W[2] * M - of_W[3] * Q)
         back[TURN + i] = turn + (odd * Psi - of_Psi[0] * W - of_Psi[2] * M + of_Psi[3] * Q)
 
 
@@ -306,7 +311,8 @@ def fill_free(
         for o in range(len(table)):
             _output(points, table[o], work, values[0], over, values[1 + o], lost_here)
         for i in range(n):
-            found[0, first + i], found[1, first + i] = values[0, i], work.scale[i]
+            found[0, first + i] = values[0, i]
+            found[1, first + i] = work.scale[i]
             lost[first + i] = lost_here[i]
             for o in range(len(table)):
                 found[2 + o, first + i] = values[1 + o, i]

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from enum import IntEnum
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from itertools import takewhile
@@ -172,11 +173,18 @@ def end_condition(inertia: Inertia) -> tuple[Fraction, Fraction, Fraction]:
     return ZERO, inertia / (1 + inertia), 1 / (1 + inertia)
 
 
-# the order at one point, from the payload inwards
-PAYLOAD, OUTER, BODY, INNER, NEXT = range(5)
+class PlaceOrder(IntEnum):
+    """The order at one point, from the payload inwards."""
+
+    payload = 0
+    outer = 1
+    body = 2
+    inner = 3
+    next = 4
+
 
 # distance from the clamp (of a segment's outer end), order there, and element
-Placed = tuple[Fraction, int, Element]
+Placed = tuple[Fraction, PlaceOrder, Element]
 
 
 def elements_with_places(elements: Iterable[Element]) -> Iterator[Placed]:
@@ -185,17 +193,22 @@ def elements_with_places(elements: Iterable[Element]) -> Iterator[Placed]:
     is_beyond = True
     for each in elements:
         is_beyond = is_beyond and isinstance(each, Offset)
-        yield position, PAYLOAD if is_beyond else BODY if isinstance(each, Body) else NEXT, each
-        position -= each.length if isinstance(each, Segment) else 0
+        order = PlaceOrder.next
+        if is_beyond:
+            order = PlaceOrder.payload
+        elif isinstance(each, Body):
+            order = PlaceOrder.body
+        yield position, order, each
+        if isinstance(each, Segment):
+            position -= each.length
 
 
 def cut_segments(elements: Sequence[Placed]) -> tuple[Element, ...]:
     """Return elements in their order from the payload inwards, each segment cut where there is another one on it."""
     ordered = sorted(elements, key=lambda each: (-each[0], each[1]))
     found: list[Element] = []
-    for (position, _, each), inner_end in zip(
-        ordered, [*(at for at, _, _ in ordered[1:]), ZERO], strict=True
-    ):
+    inner_ends = [*(position for position, _, _ in ordered[1:]), ZERO]
+    for (position, _, each), inner_end in zip(ordered, inner_ends, strict=True):
         if isinstance(each, Segment):
             segment = each
         else:
@@ -226,8 +239,6 @@ def stiffness_of(link: Link) -> Fraction:
 
 
 CONSUMER = Consumer("exact solution", acts=("plant",))
-# arms whose exact numbers are cached: one page needs those of one arm some thousand times
-SYSTEMS_KEPT = 64
 
 
 @frozen(kw_only=True)
@@ -294,7 +305,9 @@ class System:
         """The order of the drive's zero at s = 0: 2 of a free rig, 1 with friction, 0 without a rigid-body mode."""
         if not self.has_rigid_mode:
             return 0
-        return 1 if self.drive.friction or self.drive.back_emf else 2
+        if self.drive.friction or self.drive.back_emf:
+            return 1
+        return 2
 
     @cached_property
     def singular(self) -> tuple[float, ...]:
@@ -319,21 +332,27 @@ class System:
 
     @cached_property
     def _undamped(self) -> System | None:
-        return None if self.is_undamped else self.with_damping(0.0)
+        """The chain without damping, None where nothing dissipates."""
+        if self.is_undamped:
+            return None
+        return self.with_damping(0.0)
 
     def with_damping(self, share: float) -> System:
         """Return the chain with a share of all damping: C, dashpots, friction and back-EMF."""
-        parts = [
-            each._replace(damping=each.damping * share) if isinstance(each, Segment | Spring) else each
-            for each in self.elements
-        ]
-        drive = self.drive._replace(
-            friction=self.drive.friction * Fraction(share), back_emf=self.drive.back_emf * Fraction(share)
-        )
-        return replace(self, elements=tuple(parts), drive=drive)
+        elements: list[Element] = []
+        for each in self.elements:
+            if isinstance(each, Segment | Spring):
+                elements.append(each._replace(damping=each.damping * share))
+            else:
+                elements.append(each)
+        exact_share = Fraction(share)
+        friction = self.drive.friction * exact_share
+        back_emf = self.drive.back_emf * exact_share
+        drive = self.drive._replace(friction=friction, back_emf=back_emf)
+        return replace(self, elements=tuple(elements), drive=drive)
 
 
-@lru_cache(maxsize=SYSTEMS_KEPT)
+@lru_cache(maxsize=64)  # one page needs the exact numbers of one arm some thousand times
 def system_of(arm: Arm, theory: Theory | None = None) -> System:
     """Return the system of an arm under its own theory, or another.
 
@@ -353,41 +372,51 @@ def system_of(arm: Arm, theory: Theory | None = None) -> System:
         A = link.section.area
         E = link.youngs_modulus
         I = link.section.second_moment
-        shear = link.shear_factor, link.shear_modulus
+        a = b = sigma = ZERO
+        if theory in WITH_ROTARY_INERTIA:
+            a = ratio((rho, L, L), (E,))
+        if theory in WITH_SHEAR:
+            kappa_G = link.shear_factor, link.shear_modulus
+            b = ratio((rho, L, L), kappa_G)
+            sigma = ratio((E, I), (*kappa_G, A, L, L))
         return Segment(
-            a=ratio((rho, L, L), (E,)) if theory in WITH_ROTARY_INERTIA else ZERO,
-            b=ratio((rho, L, L), shear) if theory in WITH_SHEAR else ZERO,
+            a=a,
+            b=b,
             g=ratio((rho, A, L, L, L, L), (E, I)),
-            sigma=ratio((E, I), (*shear, A, L, L)) if theory in WITH_SHEAR else ZERO,
+            sigma=sigma,
             damping=link.damping,
             length=Fraction(L) / unit_length if arm.outer else ONE,
             stiffness=stiffness_of(link) / EI if arm.outer else ONE,
             half_depth=link.section.half_depth,
         )
 
-    at_tip: list[Element] = [Offset(Fraction(arm.payload.offset) / unit_length)] if arm.payload.offset else []
-    at_clamp = _springs(arm.clamp, rotation)
-    at_clamp += [Offset(Fraction(arm.hub.radius) / unit_length)] if arm.hub.radius else []
-    at_clamp += _springs(arm.joint, rotation)
-    bodies = []
+    offset = Fraction(arm.payload.offset) / unit_length
+    radius = Fraction(arm.hub.radius) / unit_length
+    chain: list[Element] = []
+    if offset:
+        chain.append(Offset(offset))
+    chain += map(segment, reversed(arm.links))
+    chain += _springs(arm.clamp, rotation)
+    if radius:
+        chain.append(Offset(radius))
+    chain += _springs(arm.joint, rotation)
+    bodies: list[Placed] = []
     for each in reversed(arm.attachments):
         body = Body(
             mass=Fraction(each.mass) * translation,
             inertia=Fraction(each.inertia) * rotation,
             # on the axis, which is fixed, a spring has no effect
-            stiffness=Fraction(each.stiffness if each.x or arm.hub.radius else 0) * translation,
+            stiffness=Fraction(each.stiffness if each.x or radius else 0) * translation,
             rotational_stiffness=Fraction(each.rotational_stiffness) * rotation,
         )
-        bodies.append((min(Fraction(each.x) / unit_length, ONE), BODY, body))
+        bodies.append((min(Fraction(each.x) / unit_length, ONE), PlaceOrder.body, body))
     return System(
-        elements=cut_segments(
-            [*elements_with_places([*at_tip, *map(segment, reversed(arm.links)), *at_clamp]), *bodies]
-        ),
+        elements=cut_segments([*elements_with_places(chain), *bodies]),
         tip_mass=_inertia(arm.payload.mass, translation),
         tip_inertia=_inertia(arm.payload.inertia, rotation),
         drive=hub_drive(arm, rotation),
-        radius=Fraction(arm.hub.radius) / unit_length,
-        offset=Fraction(arm.payload.offset) / unit_length,
+        radius=radius,
+        offset=offset,
         gauge=Place(min(Fraction(arm.gauge.x) / unit_length, ONE), arm.gauge.side),
         has_rigid_mode=arm.has_rigid_mode,
         length=unit_length,
@@ -401,9 +430,9 @@ def hub_drive(arm: Arm, rotation: Fraction) -> Drive:
     motor = arm.motor
     if arm.is_locked:
         return Drive(turns=False)
-    inertia, friction, stiffness = (
-        Fraction(each) * rotation for each in (hub.inertia, hub.friction, hub.stiffness)
-    )
+    inertia = Fraction(hub.inertia) * rotation
+    friction = Fraction(hub.friction) * rotation
+    stiffness = Fraction(hub.stiffness) * rotation
     drive = Drive(True, inertia, friction, stiffness, unit=1 / rotation)
     if motor is None:
         return drive
@@ -427,7 +456,9 @@ def hub_drive(arm: Arm, rotation: Fraction) -> Drive:
 
 def _inertia(value: float, unit: Fraction) -> Inertia:
     """Return a mass or inertia in that unit, or inf."""
-    return value if math.isinf(value) else Fraction(value) * unit
+    if math.isinf(value):
+        return value
+    return Fraction(value) * unit
 
 
 def _springs(spring: RotarySpring, rotation: Fraction) -> list[Element]:
@@ -435,7 +466,8 @@ def _springs(spring: RotarySpring, rotation: Fraction) -> list[Element]:
     if math.isinf(spring.stiffness):
         return []
     k = Fraction(spring.stiffness) * rotation
-    return [Spring(k / (1 + k), 1 / (1 + k), k * Fraction(spring.damping) / (1 + k))]
+    share = k / (1 + k)
+    return [Spring(share, 1 / (1 + k), share * Fraction(spring.damping))]
 
 
 def shear_flexibility(k: System, x: Real) -> Real:

@@ -11,6 +11,7 @@ appendix      the paper's 4x4 determinant and Cramer's rule with mpmath, at a pr
 import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import cache
 from itertools import count, takewhile
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, cast, get_args
 
@@ -22,7 +23,7 @@ from tfarm.arm import Arm, Theory
 from tfarm.arrays import Complex, Real
 from tfarm.errors import CertificationError, ParameterError, must_be_known, require
 from tfarm.exact.balls import Ball, Sweep, first_success, nearest_float, point, rational
-from tfarm.exact.layout import Layout, OutputFormula, readings
+from tfarm.exact.layout import Field, Layout, OutputFormula, readings
 from tfarm.exact.outputs import Output
 from tfarm.exact.series import constant_of, expansion_at_zero
 from tfarm.exact.sweep import AXIS, fill_free
@@ -34,11 +35,6 @@ _Value = TypeVar("_Value")
 
 # more than a float64 has
 PROVEN_BITS = 60
-# of working precision: at a pole no number of them is enough
-MOST_ENCLOSURE_BITS = 1 << 18
-_UPPER_HALF = np.exp(1j * np.pi * np.arange(1, 8) / 8)
-# in conjugate pairs
-SLOPE_CIRCLE = np.r_[1.0, _UPPER_HALF, -1.0, _UPPER_HALF[::-1].conj()]
 
 
 # ------------------------------------------------------------ the free response
@@ -60,11 +56,11 @@ def free_outputs(chain: System, wanted: Sequence[Output], s: Complex, x: float) 
 
 def free_of(layout: Layout, s: Complex) -> Free:
     """Return the free response of a layout."""
-    found, lost = _filled(layout, s)
+    found, lost = _sweep_layout(layout, s)
     return Free(found[0], found[2:], found[1], lost)
 
 
-def _filled(
+def _sweep_layout(
     layout: Layout, s: Complex, axis: Real = AXIS, *, per_input: bool = False
 ) -> tuple[Complex, NDArray[np.bool_]]:
     """Return drive, scale and outputs (rows), for a unit input if `per_input`, and where digits are lost."""
@@ -75,24 +71,32 @@ def _filled(
     return found, lost
 
 
+@cache
+def unit_circle() -> Complex:
+    """Return 16 points of the unit circle (16,), from 1 on and in conjugate pairs."""
+    upper = np.exp(1j * np.pi * np.arange(1, 8) / 8)
+    return np.asarray(read_only(np.r_[1.0, upper, -1.0, upper[::-1].conj()]))
+
+
 def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -> tuple[Free, Free]:
     """Return the free response and its derivative at s (1-D), by Cauchy's integral on a circle, to rounding."""
     # of that circle, of |s| over the phase of all waves: the 16th Taylor term is below 1e-17
     slope_radius = 0.3
     # of the way to a -1/C: its radius at most
     clear_of_singular = 0.1
+    circle = unit_circle()
     layout = readings(chain, wanted, x)
     here = free_of(layout, s)
     radius = slope_radius * np.maximum(abs(s), 1e-150) / np.maximum(1.0, abs(here.scale))
     for each in chain.singular:
         radius = np.minimum(radius, clear_of_singular * abs(s - each))
-    circle = free_of(layout, (s[:, None] + radius[:, None] * SLOPE_CIRCLE).ravel())
-    scales = circle.scale.reshape(-1, SLOPE_CIRCLE.size)
+    around = free_of(layout, (s[:, None] + radius[:, None] * circle).ravel())
+    scales = around.scale.reshape(-1, circle.size)
     here = here._replace(scale=np.where(np.isfinite(here.scale), here.scale, scales[:, 0]))
     values = np.exp(scales - here.scale[:, None])
-    slope = 1.0 / SLOPE_CIRCLE / radius[:, None]
-    drive = circle.drive.reshape(scales.shape) * values
-    outputs = circle.outputs.reshape(-1, *scales.shape) * values
+    slope = 1.0 / circle / radius[:, None]
+    drive = around.drive.reshape(scales.shape) * values
+    outputs = around.outputs.reshape(-1, *scales.shape) * values
     # there the values are means over the circle, as where two waves are one
     if here.lost.any():
         here = here._replace(
@@ -104,9 +108,10 @@ def free_slopes(chain: System, wanted: Sequence[Output], s: Complex, x: float) -
 
 def _mean(values: Complex) -> Complex:
     """Return the mean over the circle (last axis), with exactly conjugate means at conjugate points."""
-    half = SLOPE_CIRCLE.size // 2
+    count = values.shape[-1]
+    half = count // 2
     pairs = values[..., 1:half] + values[..., :half:-1]
-    return np.asarray((values[..., 0] + values[..., half] + pairs.sum(axis=-1)) / SLOPE_CIRCLE.size)
+    return np.asarray((values[..., 0] + values[..., half] + pairs.sum(axis=-1)) / count)
 
 
 def free_fields(
@@ -117,12 +122,15 @@ def free_fields(
     The states satisfy axis . (W, Psi, M, Q) = 0 on the hub's axis, by default W = 0.
     """
 
-    def with_states() -> Layout:
-        each = [OutputFormula(place, field, ZERO, 0, ONE) for place in places for field in range(4)]
-        return Layout(chain, tuple(dict.fromkeys(places)), (*each, OutputFormula(None, -1, ONE, 0, ONE)))
+    def make_layout() -> Layout:
+        each: list[OutputFormula] = []
+        for place in places:
+            each += [OutputFormula(place, field, ZERO, 0, ONE) for field in Field]
+        each.append(OutputFormula(None, -1, ONE, 0, ONE))
+        return Layout(chain, tuple(dict.fromkeys(places)), tuple(each))
 
-    layout = chain.keep(tuple(places), with_states)
-    found, _ = _filled(layout, s, np.asarray(read_only(np.ascontiguousarray(axis))))
+    layout = chain.keep(tuple(places), make_layout)
+    found, _ = _sweep_layout(layout, s, np.asarray(read_only(np.ascontiguousarray(axis))))
     return found[2:-1].reshape(len(places), 4, s.size).transpose(1, 2, 0), found[-1], found[1]
 
 
@@ -137,8 +145,10 @@ def evaluate_outputs(k: System, wanted: Sequence[Output], s: Complex, x: float =
     with np.errstate(all="ignore"):
         # of a chain by NumPy's division, which leaves no imaginary part where there is none but for rounding
         is_link = len(k.elements) == 1
-        found, lost = _filled(readings(k, wanted, x), s, per_input=is_link)
-        values: Complex = found[2:] if is_link else found[2:] / found[0]
+        found, lost = _sweep_layout(readings(k, wanted, x), s, per_input=is_link)
+        values = found[2:]
+        if not is_link:
+            values = values / found[0]
     return _with_care(k, wanted, s, x, values, lost)
 
 
@@ -175,9 +185,11 @@ def value_with_care(
     _refuse_pole(k, wanted, s, x)
     if s == 0:
         return complex(expansion_at_zero(k, wanted, x)[2 + of_slope])
-    value = nearest_float(
-        slope(k, wanted, s, x) if of_slope else enclose(k, wanted, s, bits=PROVEN_BITS, x=x)
-    )
+    if of_slope:
+        ball = slope(k, wanted, s, x)
+    else:
+        ball = enclose(k, wanted, s, bits=PROVEN_BITS, x=x)
+    value = nearest_float(ball)
     require(np.isfinite(value), "s", s, f"{wanted.name} is larger than any float64 there; choose another s")
     return value
 
@@ -196,10 +208,11 @@ def _refuse_pole(k: System, wanted: Output, s: complex, x: float) -> None:
         here, slopes = free_slopes(k, (), np.array([s]), 0.0)
     # both 0 where s^2 underflows: no pole there
     if abs(here.drive[0]) < at_a_pole * abs(s) * abs(slopes.drive[0]):
-        name = f"a natural frequency, {abs(s):.10g} rad/s" if s.real == 0 else f"an eigenvalue, {s:.10g} 1/s"
-        raise ParameterError(
-            key="s", value=s, remedy=f"a pole: {name}; the response is infinite there, move s"
-        )
+        name = f"an eigenvalue, {s:.10g} 1/s"
+        if s.real == 0:
+            name = f"a natural frequency, {abs(s):.10g} rad/s"
+        remedy = f"a pole: {name}; the response is infinite there, move s"
+        raise ParameterError(key="s", value=s, remedy=remedy)
 
 
 # ------------------------------------------------------------ enclosures, at a growing precision
@@ -213,7 +226,9 @@ def output_ball(k: System, wanted: Output, s: Ball, x: float) -> Ball | None:
     if constant is not None:
         return s**one.power * constant * rational(one.unit) / (1 + rational(one.C) * s)
     sweep = Sweep(layout, s)
-    return None if sweep.input.contains(0) else sweep.output(one) / sweep.input
+    if sweep.input.contains(0):
+        return None
+    return sweep.output(one) / sweep.input
 
 
 def accurate_ball(value: Ball | None, bits: int) -> Ball | None:
@@ -226,7 +241,7 @@ def accurate_ball(value: Ball | None, bits: int) -> Ball | None:
 def enclose(k: System, wanted: Output, s: complex, *, bits: int, x: float = 0.0) -> Ball:
     """Return a ball around the output at s with a relative radius below 2^-bits.
 
-    Raises CertificationError where that needs more than `MOST_ENCLOSURE_BITS`: at a pole or an exact zero.
+    Raises CertificationError where that needs more than 2^18 bits: at a pole or an exact zero.
     """
     return certify_by_precision(
         bits, lambda: accurate_ball(output_ball(k, wanted, point(s), x), bits), f"{bits} bits", s
@@ -238,12 +253,16 @@ def slope(k: System, wanted: Output, s: complex, x: float = 0.0) -> Ball:
     step = rational(Fraction(1, 1 << (2 * PROVEN_BITS)))
 
     def attempt() -> Ball | None:
-        value, beyond = (output_ball(k, wanted, at, x) for at in (point(s), point(s) * (1 + step)))
+        here = point(s)
+        value = output_ball(k, wanted, here, x)
+        beyond = output_ball(k, wanted, here * (1 + step), x)
         if value is None or beyond is None:
             return None
-        difference = (beyond - value) / (step * point(s))
-        is_known = (difference + value / point(s)).rel_accuracy_bits() >= PROVEN_BITS or value.is_zero()
-        return difference if is_known else None
+        difference = (beyond - value) / (step * here)
+        larger = difference + value / here
+        if larger.rel_accuracy_bits() >= PROVEN_BITS or value.is_zero():
+            return difference
+        return None
 
     return certify_by_precision(4 * PROVEN_BITS, attempt, "derivative", s)
 
@@ -255,26 +274,28 @@ def digits_of(k: System, wanted: Output, s: complex, digits: int, x: float = 0.0
     Raises ParameterError at a pole, CertificationError next to one and at an exact zero.
     """
     _refuse_pole(k, wanted, s, x)
-    # of the real and of the imaginary part
-    vanish = False, s.imag == 0
+    is_imaginary = False
+    is_real = s.imag == 0
     if s.real == 0 != s.imag and k.is_real_on_axis:
-        vanish = wanted.power % 2 == 1, wanted.power % 2 == 0
+        is_imaginary = wanted.power % 2 == 1
+        is_real = not is_imaginary
+    bits = math.ceil(3.33 * digits) + 8
+    zero = flint.arb(0)
 
     def attempt() -> tuple[str, str] | None:
         value = output_ball(k, wanted, point(s), x)
         if value is None:
             return None
-        zero = flint.arb(0)
-        bits = math.ceil(3.33 * digits) + 8
-        re, im = (
-            zero if is_zero else part for is_zero, part in zip(vanish, (value.real, value.imag), strict=True)
-        )
+        re = zero if is_imaginary else value.real
+        im = zero if is_real else value.imag
         if accurate_ball(re, bits) is None or accurate_ball(im, bits) is None:
             return None
-        return written(re), written(im)
+        return text_of(re), text_of(im)
 
-    def written(part: Ball) -> str:
-        return "0.0" if part.is_zero() else str(part.mid().str(digits, radius=False))
+    def text_of(part: Ball) -> str:
+        if part.is_zero():
+            return "0.0"
+        return str(part.mid().str(digits, radius=False))
 
     return certify_by_precision(4 * digits, attempt, f"{digits} digits", s)
 
@@ -284,9 +305,9 @@ def certify_by_precision(bits: int, attempt: Callable[[], _Value | None], number
 
     Raises CertificationError, naming the number and s, where none has one.
     """
-    precisions = takewhile(
-        lambda working: working < MOST_ENCLOSURE_BITS, ((2 * bits + 64) << n for n in count())
-    )
+    # at a pole no number of them is enough
+    most_bits = 1 << 18
+    precisions = takewhile(lambda working: working < most_bits, ((2 * bits + 64) << n for n in count()))
     failure = CertificationError(f"no {number} at s = {s:g} 1/s: it is a pole or a zero, or too close to one")
     return first_success(precisions, attempt, failure)
 
@@ -363,16 +384,17 @@ class ByMethod:
         """Return a row for each place: the value of the closed form, and the differences of the others."""
         values = self.values["closed-form"].tolist()
         apart = {k: v.tolist() for k, v in self.differences.items()}
-        balls, appendix = (apart.get(name, [None] * len(values)) for name in ("balls", "appendix"))
-        return list(map(MethodRow, at, values, balls, appendix))
+        none = [None] * len(values)
+        return list(map(MethodRow, at, values, apart.get("balls", none), apart.get("appendix", none)))
 
 
 def by_method(value: Callable[[Method], NDArray[Any]], no_appendix: str) -> ByMethod:
     """Return the values of each method, without the appendix where `no_appendix` is a reason."""
-    left_out: dict[Method, str] = {"appendix": no_appendix} if no_appendix else {}
-    return ByMethod(
-        {method: np.asarray(value(method)) for method in METHODS if method not in left_out}, left_out
-    )
+    left_out: dict[Method, str] = {}
+    if no_appendix:
+        left_out["appendix"] = no_appendix
+    values = {method: np.asarray(value(method)) for method in METHODS if method not in left_out}
+    return ByMethod(values, left_out)
 
 
 def known_method(method: str) -> Method:
@@ -404,19 +426,16 @@ def slow_values(
 
     Raises ParameterError at a pole to the last digit of float64, ConvergenceError where the appendix has no limit.
     """
+    points = s.tolist()
     if method == "balls":
-        return np.array(
-            [[value_with_care(k, each, complex(at), each.share(x)) for at in s] for each in wanted]
-        )
+        return np.array([[value_with_care(k, each, at, each.share(x)) for at in points] for each in wanted])
     # here: mpmath takes a while to load
-    from tfarm.exact import appendix
+    from tfarm.exact.appendix import output_value
 
     must_be_of_appendix(arm, arm.theory, wanted)
     place = x * arm.link.length
-    digits = APPENDIX_DIGITS
-    return np.array(
-        [
-            [complex(appendix.output_value(arm, each, complex(at), digits, place)) for at in s]
-            for each in wanted
-        ]
-    )
+
+    def values_of(each: Output) -> list[complex]:
+        return [complex(output_value(arm, each, at, APPENDIX_DIGITS, place)) for at in points]
+
+    return np.array([values_of(each) for each in wanted])

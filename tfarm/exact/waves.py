@@ -19,7 +19,7 @@ Three measures keep the last digits, each verified against balls:
 * as s -> 0 the four waves become parallel; there the transition functions F0 = (S_1 - S_2)/(z_1 - z_2) and its
   derivatives F1, F2, F3 along x, at x = l, are summed as series in z_1 + z_2 and z_1 z_2.
 
-Where z_1 = z_2 (never on the imaginary axis at C = 0) both forms lose digits, and such points are flagged (`PARALLEL`).
+Where z_1 = z_2 (never on the imaginary axis at C = 0) both forms lose digits, and `pieces.cross` flags such points.
 
 A chain of segments without cancelling waves.  The state along a chain is z = (W, Psi, M, Q).  The condition at the
 outer end leaves a plane of states.  A product of 4x4 matrices would make its two vectors parallel, as both follow the
@@ -61,8 +61,6 @@ SERIES_RADIUS = 6.0
 # the first term left out is below 15 * 6^14/28! = 4e-18
 SERIES_TERMS = 14
 INVERSE_FACTORIAL = np.array([1.0 / math.factorial(n) for n in range(2 * SERIES_TERMS + 2)])
-# |z_1 - z_2| below this share of |z_1| + |z_2|: flagged
-PARALLEL = 0.15
 
 
 @inlined
@@ -89,7 +87,7 @@ def _two_product(a: complex, b: complex) -> Double:
 
 
 @inlined
-def _scaled(high: float, low: float, number: Double) -> Double:
+def _times_double(high: float, low: float, number: Double) -> Double:
     """Return (high + low) times a double-double."""
     x, x_low = number
     product, split = _times_real(high, x)
@@ -136,9 +134,9 @@ def dispersion(s: complex, k: Any) -> tuple[tuple[complex, complex, complex], So
     Cs, Cs_low = _times_real(k.damping, s)
     d, d_low = _two_sum(complex(1.0, 0.0), Cs)
     d_low = d_low + Cs_low
-    aS = _scaled(k.a, k.a_low, S)
-    bS = _scaled(k.b, k.b_low, S)
-    gS = _scaled(k.g, k.g_low, S)
+    aS = _times_double(k.a, k.a_low, S)
+    bS = _times_double(k.b, k.b_low, S)
+    gS = _times_double(k.g, k.g_low, S)
 
     over_d = reciprocal(d)
     bend = aS[0] * over_d
@@ -150,11 +148,14 @@ def dispersion(s: complex, k: Any) -> tuple[tuple[complex, complex, complex], So
     # the larger root; the other from the product, without cancellation
     z1 = mean + spread
     z2 = (bend * shear + couple) * reciprocal(z1)
-    return (S[0], d, gS[0]), _corrected(z1, (d, d_low), aS, bS, gS), _corrected(z2, (d, d_low), aS, bS, gS)
+    damper = d, d_low
+    one = _correct_root(z1, damper, aS, bS, gS)
+    two = _correct_root(z2, damper, aS, bS, gS)
+    return (S[0], d, gS[0]), one, two
 
 
 @inlined
-def _corrected(z: complex, damper: Double, aS: Double, bS: Double, gS: Double) -> SolutionRow:
+def _correct_root(z: complex, damper: Double, aS: Double, bS: Double, gS: Double) -> SolutionRow:
     """Return z, v, t, dt after a Newton step on (d z - a S)(z - b S) + g S, a double-double residual."""
     (d, d_low) = damper
     (gS_high, gS_low) = gS
@@ -181,7 +182,9 @@ def fill_wave_numbers(s: Any, rows: Any, found: Any) -> None:
     for i in range(s.size):
         _, one, two = dispersion(s[i], rows[0])
         for n, (z, v, t, dt) in enumerate((one, two)):
-            found[n, 0, i], found[n, 1, i], found[n, 2, i] = z, v, t + dt
+            found[n, 0, i] = z
+            found[n, 1, i] = v
+            found[n, 2, i] = t + dt
 
 
 @inlined
@@ -224,7 +227,8 @@ def _series(shift: int, z_sum: Number, z_product: Number) -> tuple[Number, Numbe
     now = rest = after = 0.0 * z_sum
     for n in range(SERIES_TERMS):
         rest = z_sum * now - z_product * after
-        now, after = INVERSE_FACTORIAL[2 * (SERIES_TERMS - 1 - n) + shift] + rest, now
+        after = now
+        now = INVERSE_FACTORIAL[2 * (SERIES_TERMS - 1 - n) + shift] + rest
     return now, rest
 
 

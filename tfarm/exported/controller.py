@@ -25,11 +25,12 @@ from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real, Whole
 from tfarm.case import Case
 from tfarm.dsp.discretise import discretise_law, system_matrix
-from tfarm.dsp.kernel import DAC, estimate, law_step, quantise, to_precision
+from tfarm.dsp.kernel import DAC
 from tfarm.dsp.simulate import quantisers
 from tfarm.errors import must_be_known, require
-from tfarm.exact.compiled import compiled, inlined
 from tfarm.exact.outputs import OUTPUTS
+from tfarm.exported.kernel import Status, numbers_of, run_fixed, run_real
+from tfarm.exported.realisations import NoiseGain, least_noise, with_system_matrix
 from tfarm.exported.result import Export, ExportTask, Name, names_of
 from tfarm.exported.texts import facts_of, identifiers, literal, name_in_c, render_source
 from tfarm.exported.word_length import (
@@ -40,10 +41,7 @@ from tfarm.exported.word_length import (
     MOST_SUMMED,
     OUTPUT,
     RATE,
-    NoiseGain,
     Word,
-    least_noise,
-    with_system_matrix,
     word_of,
 )
 from tfarm.records import frozen
@@ -68,15 +66,8 @@ CONSUMER = Consumer(
     none=("reference", "volts"),
 )
 
-FILES = ("controller.h", "controller.c", "self_test.c", "example.c")
 # in C
 REAL = {"double": ("double", "", "DBL_MAX"), "float": ("float", "f", "FLT_MAX"), FIXED: ("int32_t", "", "")}
-# status of a step, 0 of one without an event
-INPUT_ERROR, OVERFLOW, SATURATED, STATE_SATURATED = range(1, 5)
-# columns of a plan
-MINUEND, SUBTRAHEND = range(2)
-# of 32 bits
-LARGEST = 2147483647
 
 
 @frozen(kw_only=True)
@@ -164,12 +155,14 @@ class Controller:
     def plan(self) -> Whole:
         """The two inputs whose difference is e of each column, as `run_real` has them: references less signals."""
         law = self.word.law
-        rate = self.inputs
-        zero = rate + 1
-        signals = {name: n for n, name in enumerate(self.signals)} | ({RATE: rate} if self.hub else {})
-        wanted = {name: len(self.signals) + n for n, name in enumerate(self.references)}
+        signals = {name: n for n, name in enumerate(self.signals)}
+        wanted = {name: n for n, name in enumerate(self.references, start=len(signals))}
+        if self.hub:
+            signals[RATE] = self.inputs
+        zero = self.inputs + 1
         rows = [(wanted[name] if name in law.references else zero, signals[name]) for name in law.signals]
-        return np.array([*rows, *((zero, wanted[name.removeprefix(REFERENCE)]) for name in law.wanted)])
+        rows += [(zero, wanted[name.removeprefix(REFERENCE)]) for name in law.wanted]
+        return np.array(rows)
 
     @property
     def inputs(self) -> int:
@@ -180,8 +173,9 @@ class Controller:
     def whole_dac(self) -> Whole:
         """The converter in fixed point: shift of its step, 0 for none, lowest and highest output."""
         step, low, high = self.dac / self.word.output * 2.0**31
-        limits = np.clip([np.ceil(low), np.floor(high)], -LARGEST - 1, LARGEST)
-        return np.array([round(math.log2(step)) if step > 1 else 0, *limits], dtype=np.int64)
+        limits = np.clip([np.ceil(low), np.floor(high)], -(2**31), 2**31 - 1)
+        shift = round(math.log2(max(step, 1.0)))
+        return np.array([shift, *limits], dtype=np.int64)
 
     @property
     def limits(self) -> list[float]:
@@ -191,24 +185,30 @@ class Controller:
         return [float(each) for each in self.dac[1:].astype(FLOATS[self.word.precision][0])]
 
     def run(self, inputs: NDArray[Any]) -> tuple[NDArray[Any], Whole]:
-        """Outputs and status (n,) of inputs (n, k), those of the C code bit for bit; whole numbers in fixed point."""
+        """Return outputs and status (n,) of inputs (n, k), those of the C code bit for bit.
+
+        Whole numbers in fixed point.
+        """
         word = self.word
-        kind = np.int64 if word.precision == FIXED else np.float64
+        is_fixed = word.precision == FIXED
+        kind = np.int64 if is_fixed else np.float64
         outputs = np.zeros(len(inputs), kind)
         status = np.zeros(len(inputs), int)
-        table, inputs = (np.ascontiguousarray(each, dtype=kind) for each in (word.table, inputs))
-        if word.precision == FIXED:
+        table = np.ascontiguousarray(word.table, dtype=kind)
+        inputs = np.ascontiguousarray(inputs, dtype=kind)
+        if is_fixed:
             run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, outputs, status)
         else:
             hub = np.array([self.signals.index(ANGLE), *self.hub] if self.hub else [-1.0, 0.0, 1.0])
             run_real(table, self.plan, inputs, self.dac, hub, word.precision == "float", outputs, status)
         # a refused sample moves no delay line: the output is held
-        is_good = ~np.isin(status, (INPUT_ERROR, OVERFLOW))
-        return np.r_[np.zeros(1 + self.delay, kind), outputs[is_good]][np.cumsum(is_good)], status
+        is_good = ~np.isin(status, (Status.INPUT_ERROR, Status.OVERFLOW))
+        line = np.r_[np.zeros(1 + self.delay, kind), outputs[is_good]]
+        return line[np.cumsum(is_good)], status
 
 
 def c_controller(task: ExportTask) -> Export:
-    """The files of a controller in C99, and its finite word length.
+    """Return the files of a controller in C99, and its finite word length.
 
     Raises ParameterError where the loop with the coefficients as exported is not certified stable, unless `anyway`.
     """
@@ -216,25 +216,27 @@ def c_controller(task: ExportTask) -> Export:
     law, name, gains = least_noise(law, task.analysis(task.case).verdict.loop)
     controller = controller_of(law, task)
     word = controller.word
-    case = task.case.under(word.rounded)
-    found = task.judged(
+    case = task.case.under(word.rounded_law)
+    found = task.judge(
         case, "precision", task.precision, f"rounded to {task.precision} the loop", "take more digits"
     )
     details = word_length(controller, name, gains, word.limit_cycle(found.verdict.loop))
     bounds = dict(facts_of(details)) | ({} if details.samples else {"samples of these bounds": "all"})
     contents, names = source_files(task, controller, [*task.facts(case, found).items()], [*bounds.items()])
-    return task.exported(contents, names, found.verdict.sentence, details)
+    return task.export_of(contents, names, found.verdict.sentence, details)
 
 
 def word_length(
     controller: Controller, name: str, gains: list[NoiseGain], limit_cycle: float | None
 ) -> WordLength:
-    """The record of a controller's arithmetic, in the realisation of this name."""
+    """Return the record of a controller's arithmetic, in the realisation of this name."""
     word = controller.word
     low, high = controller.limits
     bounds = word.bounds
     samples = None if bounds.is_whole else MOST_SUMMED
-    excluded = f"excluded for inputs within their ranges{f', for {samples} samples' if samples else ''}"
+    excluded = "excluded for inputs within their ranges"
+    if samples:
+        excluded += f", for {samples} samples"
     # in fixed point the scale of a state
     largest = 1.0 if word.precision == FIXED else float(np.finfo(FLOATS[word.precision][0]).max)
     overflow = "not excluded: a state may saturate, and the bounds hold until it does"
@@ -245,19 +247,23 @@ def word_length(
     saturation = "no limit" if high == math.inf else f"saturates from {low!r} down and from {high!r} up"
     if bounds.output + bounds.error <= min(-low, high) < math.inf:
         saturation = f"{excluded} (limits {low!r} and {high!r})"
-    output, error = (each if each < math.inf else None for each in (bounds.output, bounds.error))
     return WordLength(
         precision=word.precision,
         realisation=name,
         noise_gains=gains,
         largest_states=tuple(bounds.states.tolist()),
         overflow=overflow,
-        largest_output=output,
+        largest_output=finite_or_none(bounds.output),
         saturation=saturation,
-        error=error,
+        error=finite_or_none(bounds.error),
         samples=samples,
         limit_cycle=limit_cycle,
     )
+
+
+def finite_or_none(bound: float) -> float | None:
+    """Return a bound, None where there is none."""
+    return bound if bound < math.inf else None
 
 
 def source_files(
@@ -266,7 +272,7 @@ def source_files(
     facts: Sequence[tuple[str, str]],
     bounds: Sequence[tuple[str, str]] = (),
 ) -> tuple[dict[str, bytes], list[Name]]:
-    """The files that begin with these facts, by name, and the identifiers in them, that of the controller first.
+    """Return the files that begin with these facts, by name, and the identifiers in them, that of the controller first.
 
     `bounds` are stated with the ranges of the inputs.
     """
@@ -276,11 +282,12 @@ def source_files(
     values = template_values(task, controller, ports_of(task, controller, signals, references))
     (own,) = name.values()
     values |= {"name": own, "facts": facts, "bounds": bounds}
-    return {file: render_source(file, **values) for file in FILES}, names_of(name, signals, references)
+    files = ("controller.h", "controller.c", "self_test.c", "example.c")
+    return {file: render_source(file, **values) for file in files}, names_of(name, signals, references)
 
 
 def in_z(case: Case) -> Law:
-    """The law of a case in z, of one state space.
+    """Return the law of a case in z, of one state space.
 
     Raises ParameterError for a delay of its own that is no whole number of samples.
     """
@@ -295,7 +302,7 @@ def in_z(case: Case) -> Law:
 
 
 def controller_of(law: Law, task: ExportTask) -> Controller:
-    """A realised law in the numbers of a task.  Raises ParameterError as `word_of` does."""
+    """Return a realised law in the numbers of a task.  Raises ParameterError as `word_of` does."""
     chain = task.case.chain
     of = chain.converters
     T = chain.sampling.period
@@ -327,84 +334,11 @@ def controller_of(law: Law, task: ExportTask) -> Controller:
     return Controller(word, signals, references, ranges, dac, round(law.delay / T), hub)
 
 
-# ------------------------------------------------------------ its arithmetic, that of C and of a simulation
-
-
-@compiled
-def run_real(
-    table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, single: bool, outputs: Any, status: Any
-) -> None:
-    """Fill outputs and status (n,) of inputs (n, k), the last of which is the feedforward; refused ones are left as 0.
-
-    `table` is [A B; C D]; `plan` (columns, 2) has the two numbers whose difference is e of a column, by their places
-    among the inputs, an estimated hub rate and 0; `dac` is a row of the quantisers; `hub` index of the hub angle (-1:
-    no estimate), pole and period of the estimated rate.
-    """
-    n = table.shape[0] - 1
-    forward = inputs.shape[1] - 1
-    known = np.zeros(forward + 3)
-    z = np.zeros(table.shape[1])
-    following = np.zeros(n + 1)
-    memory = np.zeros(3)
-    clipped = np.zeros(3, np.bool_)
-    for k in range(inputs.shape[0]):
-        known[: forward + 1] = inputs[k]
-        before = memory.copy()
-        status[k] = INPUT_ERROR
-        if np.isfinite(inputs[k]).all():
-            if hub[0] >= 0.0:
-                known[-2] = to_precision(
-                    estimate(known[int(hub[0])], 0.0, memory, True, hub[1], hub[2]), single
-                )
-            for j in range(plan.shape[0]):
-                z[n + j] = to_precision(known[plan[j, MINUEND]] - known[plan[j, SUBTRAHEND]], single)
-            law_step(table, z, known[forward], single, following)
-            if np.isfinite(following).all():
-                z[:n] = following[:n]
-                outputs[k] = to_precision(quantise(following[n], dac, clipped, DAC), single)
-                status[k] = SATURATED if clipped[DAC] else 0
-            else:
-                memory[:] = before
-                status[k] = OVERFLOW
-
-
-@inlined
-def shift_right(value: int, shift: int) -> int:
-    """value/2^shift, to the nearest whole number, halves upwards."""
-    return (value + (1 << (shift - 1))) >> shift
-
-
-@compiled
-def run_fixed(table: Any, shifts: Any, plan: Any, inputs: Any, dac: Any, outputs: Any, status: Any) -> None:
-    """The same in fixed point; `dac` is the shift of the step of the DAC, 0 for none, lowest and highest output."""
-    n = table.shape[0] - 1
-    forward = inputs.shape[1] - 1
-    known = np.zeros(forward + 3, np.int64)
-    z = np.zeros(table.shape[1], np.int64)
-    following = np.zeros(n + 1, np.int64)
-    for k in range(inputs.shape[0]):
-        known[: forward + 1] = inputs[k]
-        for j in range(plan.shape[0]):
-            z[n + j] = known[plan[j, MINUEND]] - known[plan[j, SUBTRAHEND]]
-        for i in range(n + 1):
-            total = known[forward] << shifts[n] if i == n else 0
-            for j in range(z.size):
-                total += table[i, j] * z[j]
-            following[i] = shift_right(total, shifts[i])
-        u = shift_right(following[n], dac[0]) << dac[0] if dac[0] > 0 else following[n]
-        outputs[k] = min(max(u, dac[1]), dac[2])
-        status[k] = SATURATED if outputs[k] != u else 0
-        for i in range(n):
-            z[i] = min(max(following[i], -LARGEST - 1), LARGEST)
-            if z[i] != following[i]:
-                status[k] = STATE_SATURATED
-
-
 # ------------------------------------------------------------ values of the templates
 
 
 def template_values(task: ExportTask, controller: Controller, ports: Sequence[Port]) -> dict[str, Any]:
-    """The values of the templates, but for name and facts."""
+    """Return the values of the templates, but for name and facts."""
     word = controller.word
     is_fixed = task.precision == FIXED
     real, suffix, largest = REAL[task.precision]
@@ -422,7 +356,7 @@ def template_values(task: ExportTask, controller: Controller, ports: Sequence[Po
         "cast": cast,
         "fields": ports,
         **self_test_values(controller.run, ports, task.precision),
-        "header": FILES[0],
+        "header": "controller.h",
         "n": word.law.order,
         "m": len(controller.plan),
         "shifts": word.shifts,
@@ -441,32 +375,33 @@ def template_values(task: ExportTask, controller: Controller, ports: Sequence[Po
 
 
 def statuses(controller: Controller) -> dict[str, int]:
-    """What a step can return but 0, by the names in C."""
+    """Return the numbers that a step can return but 0, by their names in C."""
     if controller.word.precision == FIXED:
-        return {"SATURATED": SATURATED} | (
-            {"STATE_SATURATED": STATE_SATURATED} if controller.word.law.order else {}
-        )
-    refused = {"INPUT_ERROR": INPUT_ERROR, "OVERFLOW": OVERFLOW}
-    return refused | ({"SATURATED": SATURATED} if math.isfinite(controller.limits[1]) else {})
+        found = [Status.SATURATED]
+        if controller.word.law.order:
+            found.append(Status.STATE_SATURATED)
+        return numbers_of(*found)
+    found = [Status.INPUT_ERROR, Status.OVERFLOW]
+    if math.isfinite(controller.limits[1]):
+        found.append(Status.SATURATED)
+    return numbers_of(*found)
 
 
 def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -> list[Port]:
-    """The inputs of the C function: signals, references, and the feedforward."""
+    """Return the inputs of the C function: signals, references, and the feedforward."""
     word = controller.word
     ranges = controller.ranges
+    steps = ""
     if controller.hub and RATE in ranges:
         steps = f", at most {ranges[RATE] * controller.hub[1]!r} a sample"
-    else:
-        steps = ""
     over = ", over {!r}".format if word.precision == FIXED else lambda size: ""
     found = []
     for title, names in zip(("", "reference of "), known, strict=True):
         for name, own in names.items():
             size = ranges.get(name, 1.0)
-            text = (
-                f"{title}{name} [{OUTPUTS[name.partition('@')[0]].unit}]{steps * (name == ANGLE)}{over(size)}"
-            )
-            found.append(Port(own, text, size))
+            unit = OUTPUTS[name.partition("@")[0]].unit
+            step = steps if name == ANGLE else ""
+            found.append(Port(own, f"{title}{name} [{unit}]{step}{over(size)}", size))
     text = f"{FEEDFORWARD} [{task.case.arm.input_unit}]{over(word.output)}"
     return [*found, Port(FEEDFORWARD, text, word.feedforward)]
 
@@ -474,7 +409,7 @@ def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -
 def self_test_values(
     run: Callable[[NDArray[Any]], tuple[NDArray[Any], Whole]], ports: Sequence[Port], precision: str
 ) -> dict[str, Any]:
-    """Values of the template of a self-test, whose inputs are those of a linear congruential generator."""
+    """Return values of the template of a self-test, whose inputs are those of a linear congruential generator."""
     # a thousand samples, one of them refused for a NaN
     samples = 1000
     refused = 500
@@ -490,14 +425,11 @@ def self_test_values(
         inputs = (sizes * ((inputs >> 8) / 2.0**23 - 1).astype(kind)).astype(float)
         inputs[refused, 0] = np.nan
     outputs, status = run(inputs)
-    sizes_in_c, recorded_in_c = (
-        [literal(each, REAL[precision][1]) for each in values]
-        for values in ([each.size for each in ports], outputs.tolist())
-    )
+    _, suffix, _ = REAL[precision]
     return {
-        "sizes": sizes_in_c,
+        "sizes": [literal(each.size, suffix) for each in ports],
         "refused": refused,
         "seed": seed,
-        "recorded": recorded_in_c,
+        "recorded": [literal(each, suffix) for each in outputs.tolist()],
         "status": status.tolist(),
     }

@@ -60,53 +60,7 @@ CONSUMER = Consumer(
     none=("reference", "volts"),
 )
 
-COMPILERS = ("cc", "gcc", "clang")
-# s
-LONGEST_COMPILATION = 60.0
-# characters
-LONGEST_TEXT = 400
-# category of messages
-ERRORS = "logStatusError"
 MEASURED = "measured:"
-AT = ("const fmi2ValueReference *", "size_t")
-ABSENT = "report(c, fmi2Error, __func__)"
-# of FMI in one statement: name, types of arguments, status
-FUNCTIONS: tuple[tuple[str, tuple[str, ...], str], ...] = (
-    ("SetDebugLogging", ("fmi2Boolean", "size_t", "const fmi2String *"), "fmi2OK"),
-    ("SetupExperiment", ("fmi2Boolean", "fmi2Real", "fmi2Real", "fmi2Boolean", "fmi2Real"), "begin(c, a3)"),
-    ("EnterInitializationMode", (), "fmi2OK"),
-    ("ExitInitializationMode", (), "((model *)c)->at.is_running = 1, fmi2OK"),
-    ("Terminate", (), "fmi2OK"),
-    ("Reset", (), "memset(((model *)c)->given, 0, sizeof ((model *)c)->given), begin(c, 0.0)"),
-    *(
-        (f"{act}{kind}", (*AT, f"{const}fmi2{kind} *"), f"a2 ? {ABSENT} : fmi2OK")
-        for kind in ("Integer", "Boolean", "String")
-        for act, const in (("Get", ""), ("Set", "const "))
-    ),
-    ("GetFMUstate", ("fmi2FMUstate *",), ABSENT),
-    ("SetFMUstate", ("fmi2FMUstate",), ABSENT),
-    ("FreeFMUstate", ("fmi2FMUstate *",), ABSENT),
-    ("SerializedFMUstateSize", ("fmi2FMUstate", "size_t *"), ABSENT),
-    ("SerializeFMUstate", ("fmi2FMUstate", "fmi2Byte *", "size_t"), ABSENT),
-    ("DeSerializeFMUstate", ("const fmi2Byte *", "size_t", "fmi2FMUstate *"), ABSENT),
-    ("GetDirectionalDerivative", (*AT, *AT, "const fmi2Real *", "fmi2Real *"), ABSENT),
-    ("SetRealInputDerivatives", (*AT, "const fmi2Integer *", "const fmi2Real *"), ABSENT),
-    ("GetRealOutputDerivatives", (*AT, "const fmi2Integer *", "fmi2Real *"), ABSENT),
-    ("CancelStep", (), ABSENT),
-    ("GetStatus", ("fmi2StatusKind", "fmi2Status *"), "fmi2Discard"),
-    ("GetIntegerStatus", ("fmi2StatusKind", "fmi2Integer *"), "fmi2Discard"),
-    ("GetStringStatus", ("fmi2StatusKind", "fmi2String *"), "fmi2Discard"),
-    (
-        "GetRealStatus",
-        ("fmi2StatusKind", "fmi2Real *"),
-        "*a2 = ((model *)c)->at.time, a1 == fmi2LastSuccessfulTime ? fmi2OK : fmi2Discard",
-    ),
-    (
-        "GetBooleanStatus",
-        ("fmi2StatusKind", "fmi2Boolean *"),
-        "*a2 = ((model *)c)->at.is_stopped, a1 == fmi2Terminated ? fmi2OK : fmi2Discard",
-    ),
-)
 
 
 class Variable(NamedTuple):
@@ -161,21 +115,19 @@ def fmu(task: ExportTask) -> Export:
     head: dict[str, Any] = {"variables": variables, "has_plant": has_plant, "period": period, "about": about}
     head["guid"] = guid[:32]
     plant = plant_code(prepared)
-    source = render_source(
-        "fmu.c", law=law, functions=FUNCTIONS, errors=ERRORS, sha256=task.sha256, **head, **plant
-    )
+    source = render_source("fmu.c", law=law, sha256=task.sha256, **head, **plant)
     sources = {"fmi2.h": render_source("fmi2.h"), "fmu.c": source, **(law.files if law else {})}
     binary, compiler = binary_of(sources, own[name])
     files = {f"sources/{name}": content for name, content in sources.items()} | binary
     files["modelDescription.xml"] = model_description(sources, own[name], **head)
     content = {f"{task.what}.fmu": archive_of(files)}
-    return task.exported(content, names_of(own), verdict, Unit(variables, modes, compiler))
+    return task.export_of(content, names_of(own), verdict, Unit(variables, modes, compiler))
 
 
 def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCode:
-    """The controller as simulated: its law as given, its readings and its output those of the converters of a plant.
+    """Return the controller as simulated: its law as given.
 
-    In a closed loop its delay is that of the plant.
+    Its readings and its output are those of the converters of a plant, and in a closed loop its delay too.
     """
     remedy = "a functional mock-up unit has a controller in double or float; take c for fixed point"
     require(task.precision != FIXED, "precision", task.precision, remedy)
@@ -183,7 +135,7 @@ def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCo
     own = task.case.under(replace(law, delay=0.0) if task.what == "loop" else law)
     controller = controller_of(in_z(own), task)
     controller = replace(controller, hub=None, signals=law.signals, dac=np.array([0.0, -np.inf, np.inf]))
-    case = task.case.under(replace(controller.word.rounded, delay=task.case.law.delay))
+    case = task.case.under(replace(controller.word.rounded_law, delay=task.case.law.delay))
     found = task.analysis(case)
     files, (first, *_) = source_files(task, controller, [*task.facts(case, found).items()])
     place: dict[str, str] = {}
@@ -198,7 +150,9 @@ def law_code(task: ExportTask, law: Law, variables: Sequence[Variable]) -> LawCo
 
 
 def prepared_simulator(task: ExportTask) -> Simulator:
-    """The simulator of the loop, with the modes that the simulation of a slew has; of a step where there is no slew.
+    """Return the simulator of the loop, with the modes that the simulation of a slew has.
+
+    Of a step where there is no slew.
 
     A plant alone has no delay of the law.
     """
@@ -213,7 +167,7 @@ def prepared_simulator(task: ExportTask) -> Simulator:
 
 
 def variables_of(what: What, of: Simulator) -> list[Variable]:
-    """The variables of a unit: inputs, parameters, outputs."""
+    """Return the variables of a unit: inputs, parameters, outputs."""
     drive = of.plant.arm.input
     law = of.law
 
@@ -241,7 +195,7 @@ def variables_of(what: What, of: Simulator) -> list[Variable]:
 
 
 def plant_code(of: Simulator) -> dict[str, Any]:
-    """The numbers of the plant in its template."""
+    """Return the numbers of the plant in its template."""
     # of a range without limit
     largest = sys.float_info.max
     chain = of.electronics
@@ -267,12 +221,12 @@ def plant_code(of: Simulator) -> dict[str, Any]:
 
 
 def real_and_imaginary(values: Complex) -> Real:
-    """Real and imaginary parts, in a further axis."""
+    """Return real and imaginary parts, in a further axis."""
     return np.stack([values.real, values.imag], axis=-1)
 
 
 def braces(values: Any) -> str:
-    """An array of C, every number with all of its digits."""
+    """Return an array of C, every number with all of its digits."""
     if np.ndim(values):
         return f"{{{', '.join(map(braces, values))}}}"
     return literal(values)
@@ -291,7 +245,7 @@ def model_description(
     about: str,
     guid: str,
 ) -> bytes:
-    """The file modelDescription.xml: at a communication point outputs of a plant depend on no input there."""
+    """Return the file modelDescription.xml: at a communication point outputs of a plant depend on no input there."""
     outputs = [str(n) for n, each in enumerate(variables, 1) if each.causality == "output"]
     known = {"dependencies": ""} if has_plant else {}
     structure = [
@@ -310,7 +264,7 @@ def model_description(
             canNotUseMemoryManagementFunctions="true",
         ),
         element("UnitDefinitions", *units),
-        element("LogCategories", element("Category", name=ERRORS)),
+        element("LogCategories", element("Category", name="logStatusError")),
         element("DefaultExperiment", startTime="0", stopTime=repr(TRIAL_DURATION), stepSize=period),
         element(
             "ModelVariables", *(variable_element(n, each, has_plant) for n, each in enumerate(variables))
@@ -319,7 +273,7 @@ def model_description(
         fmiVersion="2.0",
         modelName=identifier,
         guid=guid,
-        description=one_line(about, LONGEST_TEXT),
+        description=one_line(about, 400),
         generationTool=f"tfarm {version('tfarm')}",
         variableNamingConvention="flat",
         numberOfEventIndicators="0",
@@ -329,7 +283,7 @@ def model_description(
 
 
 def variable_element(reference: int, of: Variable, has_plant: bool) -> Element:
-    """A variable in the description; those of a sampled system change at the samples."""
+    """Return a variable in the description; those of a sampled system change at the samples."""
     is_computed = of.causality == "output" and has_plant
     initial = {"initial": "calculated" if has_plant else "exact"} if of.causality == "output" else {}
     return element(
@@ -345,48 +299,43 @@ def variable_element(reference: int, of: Variable, has_plant: bool) -> Element:
 
 
 def element(tag: str, *children: Element, **attributes: str) -> Element:
-    """An element of XML with its children."""
+    """Return an element of XML with its children."""
     parent = Element(tag, attributes)
     parent.extend(children)
     return parent
 
 
-def binary_of(sources: Mapping[str, bytes], identifier: str) -> tuple[dict[str, bytes], str]:
-    """The binary for this machine by its path in a unit, none without a compiler; and platform and compiler."""
+def binary_of(
+    sources: Mapping[str, bytes], identifier: str, longest: float = 60.0
+) -> tuple[dict[str, bytes], str]:
+    """Return the binary for this machine by its path in a unit, none without a compiler; and platform and compiler.
+
+    None too of one that compiles for longer than that [s].
+    """
+    compilers = ("cc", "gcc", "clang")
     # no fused operation
     options = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
     platforms = {"linux": ("linux64", ".so"), "darwin": ("darwin64", ".dylib"), "win32": ("win64", ".dll")}
-    compiler = next(filter(None, map(shutil.which, COMPILERS)), None)
+    compiler = next(filter(None, map(shutil.which, compilers)), None)
     if compiler is None or sys.platform not in platforms:
-        return {}, f"none: no compiler found ({', '.join(COMPILERS)})"
+        return {}, f"none: no compiler found ({', '.join(compilers)})"
     platform, suffix = platforms[sys.platform]
     with temporary_folder(Path(tempfile.gettempdir())) as folder:
         for name, content in sources.items():
             (folder / name).write_bytes(content)
-        command = [
-            compiler,
-            *options,
-            "-o",
-            f"unit{suffix}",
-            *(name for name in sources if name.endswith(".c")),
-        ]
+        files = [name for name in sources if name.endswith(".c")]
+        command = [compiler, *options, "-o", f"unit{suffix}", *files]
+        how: dict[str, Any] = {"check": True, "capture_output": True, "stdin": subprocess.DEVNULL}
         try:
-            subprocess.run(
-                command,
-                cwd=folder,
-                check=True,
-                timeout=LONGEST_COMPILATION,
-                capture_output=True,
-                stdin=subprocess.DEVNULL,
-            )
+            subprocess.run(command, cwd=folder, timeout=longest, **how)
             binary = (folder / f"unit{suffix}").read_bytes()
         except (OSError, subprocess.SubprocessError) as error:
-            return {}, f"none: {one_line(f'{compiler}: {error}', LONGEST_TEXT)}"
+            return {}, f"none: {one_line(f'{compiler}: {error}', 400)}"
     return {f"binaries/{platform}/{identifier}{suffix}": binary}, f"{platform}, by {Path(compiler).name}"
 
 
 def archive_of(files: Mapping[str, bytes]) -> bytes:
-    """An archive of files, the same for the same content: without their dates."""
+    """Return an archive of files, the same for the same content: without their dates."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in sorted(files):

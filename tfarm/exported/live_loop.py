@@ -28,10 +28,12 @@ from tfarm.assessment.stability_map import BEYOND_PICTURE, sampled_region
 from tfarm.case import Case
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits
-from tfarm.dsp import Chain, PulseTransfer, Simulator, scenario, traces
-from tfarm.dsp.plant import Plant, sensed_plant
+from tfarm.dsp import Chain, PulseTransfer, Simulator, scenario
+from tfarm.dsp.plant import Plant
 from tfarm.dsp.results import enough_modes, ideal_chain
-from tfarm.dsp.simulate import FOLDED_UP, quantisers
+from tfarm.dsp.scenarios import TRIAL_SLEWS
+from tfarm.dsp.sensed import sensed_plant
+from tfarm.dsp.simulate import largest_moment, quantisers
 from tfarm.errors import TfarmError
 from tfarm.loop.circle_crossings import GainMap
 from tfarm.loop.continuous import ContinuousLoop, steep_places
@@ -152,7 +154,7 @@ def _of_parts(case: Case) -> LiveNumbers:
         },
         "units": dict.fromkeys(gains, "1"),
         # without 0, at which poles may join those at s = 0
-        "axes": {name: _around(value) for name, value in gains.items()},
+        "axes": {name: range_around(value) for name, value in gains.items()},
         "start": gains,
         "reference": gains,
         **dict.fromkeys(("continuous", "sampled_map", "slew", "lyapunov", "default", "outputs")),
@@ -160,7 +162,7 @@ def _of_parts(case: Case) -> LiveNumbers:
     }
 
 
-def _around(value: float) -> LiveNumbers:
+def range_around(value: float) -> LiveNumbers:
     """Return the range of a gain around its value."""
     low, high = sorted((value / 10, value * 10))
     return _range(Axis(low, high, abs(value) / 10))
@@ -184,8 +186,8 @@ def _of_any_law(case: Case, corners: Sequence[Case], unit: Law | None = None) ->
         "longest_delay": LONGEST_DELAY_SAMPLES * period,
         "limits": GRADE_LIMITS,
         **samples,
-        **_known(arm, is_quiet, unit is None),
-        "graded": _graded(case, corners, unit) if arm.has_elastic_link else None,
+        **theorem_numbers(arm, is_quiet, unit is None),
+        "graded": graded_loop(case, corners, unit) if arm.has_elastic_link else None,
         "margin_names": dict(zip(("up", "down", "phase", "delay", "peak"), GRADED.values(), strict=True)),
     }
 
@@ -201,7 +203,9 @@ def _samples(case: Case, corners: Sequence[Case], unit: Law | None) -> tuple[Liv
     arm = case.arm
     band, is_quiet = band_of_family(map(ContinuousLoop, corners))
     samples = loop_panels(arm, band, None if unit is None else ContinuousLoop(case.under(unit)))
-    own = [abs(s) for block in _blocks(unit) for s in (*block.poles, *block.zeros) if s] if unit else []
+    own: list[float] = []
+    for block in _blocks(unit) if unit else ():
+        own += [abs(s) for s in (*block.poles, *block.zeros) if s]
     return {
         # by panel, part and point
         "samples": pack_doubles(samples.values.transpose(1, 0, 2)),
@@ -215,7 +219,7 @@ def _samples(case: Case, corners: Sequence[Case], unit: Law | None) -> tuple[Liv
     }, is_quiet
 
 
-def _graded(case: Case, corners: Sequence[Case], unit: Law | None) -> LiveNumbers:
+def graded_loop(case: Case, corners: Sequence[Case], unit: Law | None) -> LiveNumbers:
     """Return the loop with whose damping an undamped arm is graded, and the words for that: `tfarm.assessment.card`."""
     damped, words = graded_arm(case.arm)
     samples, _ = _samples(case.on(damped), [each.on(damped) for each in corners], unit)
@@ -226,7 +230,7 @@ def _graded(case: Case, corners: Sequence[Case], unit: Law | None) -> LiveNumber
     }
 
 
-def _known(arm: Arm, is_quiet: bool, are_gains: bool) -> LiveNumbers:
+def theorem_numbers(arm: Arm, is_quiet: bool, are_gains: bool) -> LiveNumbers:
     """Return theorems on gains at the hub, bounds beyond the frequency range, and the static balance."""
     is_reactive = are_gains and arm.is_reactive
     if is_reactive:
@@ -269,11 +273,12 @@ def _stable_moments(arm: Arm) -> list[float | None]:
 
 def _areas(plane: Plane | GainMap) -> list[dict[str, float]]:
     """Return rows across, low, high of the parts of the stable region, each part with its number."""
-    return [
-        {"part": number, PLANE[0]: x, "low": low, "high": high}
-        for number, piece in enumerate(pieces(plane.x, plane.stable_intervals))
-        for x, low, high in (kept_digits(point, 7) for point in piece.points)
-    ]
+    rows = []
+    for number, piece in enumerate(pieces(plane.x, plane.stable_intervals)):
+        for point in piece.points:
+            x, low, high = kept_digits(point, 7)
+            rows.append({"part": number, PLANE[0]: x, "low": low, "high": high})
+    return rows
 
 
 # ------------------------------------------------------------ at the samples
@@ -297,8 +302,13 @@ def sampled_numbers(loop: Sampled) -> LiveNumbers:
     These are 2, 1 where it is damped or driven through a motor, or 0.
     """
     plant = sensed_plant(loop.plant.arm, loop.chain, FED_BACK, loop.plant.count).together
-    folded = PulseTransfer(plant, loop.chain.sampling).folded().plant
-    return {**_sampling(loop.chain), **_plant(folded), "states": _orders(plant)[0], "modes": plant.count}
+    folded = PulseTransfer(plant, loop.chain.sampling).without_fast_poles().plant
+    return {
+        **sampling_numbers(loop.chain),
+        **_plant(folded),
+        "states": _orders(plant)[0],
+        "modes": plant.count,
+    }
 
 
 def _in_page(case: Case, unit: Law | None) -> LiveNumbers:
@@ -315,7 +325,7 @@ def law_in_page(loop: Sampled, names: Sequence[str]) -> LiveNumbers:
     in_z = loop.in_z
     orders = _orders(plant)
     return {
-        **_sampling(loop.chain),
+        **sampling_numbers(loop.chain),
         **_plant(plant),
         "ones": max(0, *(orders[row] - int((zeros == 0).sum()) for _, row, _, zeros in in_z.columns)),
         "modes": loop.plant.count,
@@ -332,7 +342,7 @@ def law_in_page(loop: Sampled, names: Sequence[str]) -> LiveNumbers:
     }
 
 
-def _sampling(chain: Chain) -> LiveNumbers:
+def sampling_numbers(chain: Chain) -> LiveNumbers:
     """Return the period [s], the delay in samples, and how the hub rate is had: `smoothing` is its filter's pole."""
     T = chain.sampling.period
     of = chain.converters
@@ -356,7 +366,8 @@ def _plant(plant: Plant) -> LiveNumbers:
 
 def _orders(plant: Plant) -> list[int]:
     """Return the order of the pole of each output at s = 0."""
-    return [2 if twice else 1 if once else 0 for twice, once in plant.rigid.tolist()]
+    twice, once = (plant.rigid != 0).T
+    return np.where(twice, 2, once).tolist()
 
 
 def _pairs(values: Complex) -> list[list[float]]:
@@ -376,7 +387,7 @@ def slew_numbers(case: Case) -> LiveNumbers | None:
     arm = case.arm
     chain = case.chain
     try:
-        task = scenario("slew", arm, chain, traces.RECORD_LENGTH * chain.slew.rise_time)
+        task = scenario("slew", arm, chain, TRIAL_SLEWS * chain.slew.rise_time)
         if task.t.size > 5000:
             return None
         ideal = case.through(ideal_chain(chain))
@@ -384,7 +395,7 @@ def slew_numbers(case: Case) -> LiveNumbers | None:
         plant = _upper(Simulator(case, task, count=count).plant)
         signals = task.feedforward, task.hub_angle, task.hub_rate, task.moment_reference, task.rigid_moment
         return {
-            **_sampling(chain),
+            **sampling_numbers(chain),
             **_plant(plant),
             **_shapes(arm, plant),
             "ideal": pack_doubles(np.stack(signals, axis=1)),
@@ -392,7 +403,7 @@ def slew_numbers(case: Case) -> LiveNumbers | None:
                 [x if math.isfinite(x) else None for x in row] for row in quantisers(chain).tolist()
             ],
             "single": chain.converters.is_single,
-            "bound": FOLDED_UP * arm.bending_scale,
+            "bound": largest_moment(arm),
             "rise": task.busy_until,
             "drive": arm.input.split("_")[1],
             "unit": arm.input_unit,

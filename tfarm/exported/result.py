@@ -68,7 +68,7 @@ class ExportTask:
         return hashlib.sha256(text.encode()).hexdigest()
 
     def analysis(self, case: Case) -> Analysis:
-        """The sampled loop of a case, in most cases that of the task with its numbers as they are rounded in the files.
+        """Return the sampled loop of a case, mostly that of the task with its numbers as rounded in the files.
 
         Code in C has a realisation of its own, whose rounded numbers are judged once it is chosen: here the law is in
         float64.  Raises ParameterError for a loop that is not certified stable, unless `anyway`.
@@ -76,24 +76,27 @@ class ExportTask:
         if self.form == "c":
             converters = replace(case.chain.converters, arithmetic="float64")
             case = case.through(replace(case.chain, converters=converters))
-        return self.judged(case, "law", self.case.law.name, "the sampled loop", "--anyway exports it")
+        return self.judge(case, "law", self.case.law.name, "the sampled loop", "--anyway exports it")
 
-    def judged(self, case: Case, key: str, value: str, loop: str, remedy: str) -> Analysis:
-        """The sampled loop of a case.  Raises ParameterError where it is not certified stable, unless `anyway`."""
+    def judge(self, case: Case, key: str, value: str, loop: str, remedy: str) -> Analysis:
+        """Return the sampled loop of a case.
+
+        Raises ParameterError where it is not certified stable, unless `anyway`.
+        """
         found = sampled(case.arm, case.law, case.chain)
         words = f"{loop} is not certified stable: {found.verdict.sentence}; {remedy}"
         require(self.anyway or is_certified(found), key, value, words)
         return found
 
-    def exported(
+    def export_of(
         self, contents: Mapping[str, bytes], names: list[Name], verdict: str, details: object = None
     ) -> Export:
-        """The record of the files of this task."""
+        """Return the record of the files of this task."""
         own = {"what": self.what, "form": self.form, "sha256": self.sha256}
         return Export(contents=contents, names=names, verdict=verdict, details=details, **own)
 
     def facts(self, case: Case, found: Analysis) -> dict[str, str]:
-        """The facts that a file begins with, by label: arm, law, stability and margins of the sampled loop, version."""
+        """Return the facts that a file begins with, by label: arm, law, stability and margins of the loop, version."""
         sampling = self.case.chain.sampling
         shown = {}
         with suppress(ConvergenceError):
@@ -111,7 +114,7 @@ class ExportTask:
 
 
 def is_certified(found: Analysis) -> bool:
-    """Whether a sampled loop is certified stable."""
+    """Return whether a sampled loop is certified stable."""
     return found.verdict.is_settled and found.verdict.is_stable
 
 
@@ -139,8 +142,8 @@ class Export:
 
 
 def names_of(*mappings: Mapping[str, str]) -> list[Name]:
-    """The names of `identifiers` as rows."""
-    return [Name(name, identifier) for mapping in mappings for name, identifier in mapping.items()]
+    """Return the names of `identifiers` as rows."""
+    return [Name(*pair) for mapping in mappings for pair in mapping.items()]
 
 
 def write_into(folder: Path, contents: Mapping[str, bytes]) -> None:

@@ -29,16 +29,18 @@ from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex
 from tfarm.case import Case
 from tfarm.dsp.discretise import acting_law, with_estimate
-from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, arm_under_chain, sensed_plant
+from tfarm.dsp.plant import USUAL_MODES, arm_under_chain
+from tfarm.dsp.pulse import PulseTransfer
+from tfarm.dsp.sensed import sensed_plant
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import require
+from tfarm.exported.realisations import close_state_space
 from tfarm.exported.result import Export, ExportTask, names_of
 from tfarm.exported.texts import comment, matlab_text, render_source
-from tfarm.exported.word_length import close_state_space
 from tfarm.files import is_standard_output, mat_content, write_file
 from tfarm.records import frozen
 from tfarm.reduced import BAND, ReducedModel, modal_model, reduce
-from tfarm.reduced.partial_fractions import CLEAR_OF_POLES, distance, frequencies_around
+from tfarm.reduced.partial_fractions import frequencies_around, is_clear_of
 from tfarm.reduced.reduction import NORM
 from tfarm.response import transfer
 from tfarm.response.signals import Signals
@@ -103,7 +105,7 @@ def plant_system(case: Case) -> NamedSystem:
     acting, late = acting_law(case)
     signals = with_estimate(acting, late).signals
     sensed = sensed_plant(case.arm, late, list(dict.fromkeys((*signals, "tip_displacement"))), USUAL_MODES)
-    A, B, C = PulseTransfer(sensed.together, late.sampling).folded().matrices()
+    A, B, C = PulseTransfer(sensed.together, late.sampling).without_fast_poles().matrices()
     matrices = A, B[:, None], C, np.zeros((len(C), 1))
     states = tuple(f"plant{n + 1}" for n in range(len(A)))
     name = f"{case.arm.name}, sampled"
@@ -172,7 +174,7 @@ def response_data(
 ) -> dict[str, Any]:
     """Return the exact frequency response (outputs, 1, n) over a range [rad/s], clear of the poles on the axis."""
     omega = np.geomspace(*band, 1000)
-    omega = omega[distance(omega, frequencies_around(arm, band[1])) > CLEAR_OF_POLES * omega]
+    omega = omega[is_clear_of(omega, frequencies_around(arm, band[1]))]
     return {
         "omega": omega,
         "response": G(1j * omega)[:, None, :],
@@ -228,7 +230,7 @@ def linear(task: ExportTask) -> Linear:
 def mat(task: ExportTask) -> Export:
     """Return the MATLAB file of a task and its script."""
     found = linear(task)
-    return task.exported(mat_files(f"{task.what}.mat", found), [], found.verdict)
+    return task.export_of(mat_files(f"{task.what}.mat", found), [], found.verdict)
 
 
 def mat_files(name: str, of: Linear) -> dict[str, bytes]:
@@ -293,10 +295,12 @@ def save_mat(reduced: ReducedModel, path: Path, *, key: str = "path") -> tuple[P
 def py(task: ExportTask) -> Export:
     """Return the script of a task."""
     found = linear(task)
-    every = [name for each in found.systems.values() for name in (*each.inputs, *each.outputs)]
+    every: list[str] = []
+    for each in found.systems.values():
+        every += (*each.inputs, *each.outputs)
     changed = {name: new for name, new in zip(every, without_dots(every), strict=True) if new != name}
     contents = {f"{task.what}.py": render_source("systems.txt", of=found, listed=list_literal)}
-    return task.exported(contents, names_of(changed), found.verdict)
+    return task.export_of(contents, names_of(changed), found.verdict)
 
 
 def without_dots(names: Iterable[str]) -> list[str]:

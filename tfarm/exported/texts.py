@@ -15,14 +15,12 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from tfarm.schema import entries, text
 
-# characters of an identifier that C99 compares
-LONGEST_IDENTIFIER = 31
 
-
-def identifiers(names: Iterable[str], prefix: str, longest: int = LONGEST_IDENTIFIER) -> dict[str, str]:
+def identifiers(names: Iterable[str], prefix: str, longest: int = 31) -> dict[str, str]:
     """Return an identifier of C, C++, MATLAB and Python for each name: `prefix`, letters, digits and underscores.
 
-    A prefix that ends in an underscore, such as "y_", begins no keyword.  Equal identifiers are numbered.
+    A prefix that ends in an underscore, such as "y_", begins no keyword.  Equal identifiers are numbered.  C99 compares
+    their first 31 characters.
     """
     found: dict[str, str] = {}
     taken: set[str] = set()
@@ -40,13 +38,18 @@ def identifiers(names: Iterable[str], prefix: str, longest: int = LONGEST_IDENTI
 def comment(words: str) -> str:
     """Return one line of printable ASCII that ends no comment of C and continues none."""
     plain = unicodedata.normalize("NFKD", words)
-    line = "".join(
-        c if " " <= c <= "~" else " " if c.isspace() else "?" for c in plain if not unicodedata.combining(c)
-    )
+    line = "".join(printable(c) for c in plain if not unicodedata.combining(c))
     # marks of C, and the trigraph of a backslash
     for mark, instead in (("\\", "|"), ("*/", "* /"), ("/*", "/ *"), ("??/", "? ?/")):
         line = line.replace(mark, instead)
     return line[:200].strip()
+
+
+def printable(character: str) -> str:
+    """Return a character of printable ASCII for any other one."""
+    if " " <= character <= "~":
+        return character
+    return " " if character.isspace() else "?"
 
 
 def matlab_text(words: str) -> str:
@@ -56,10 +59,10 @@ def matlab_text(words: str) -> str:
 
 def name_in_c(wanted: str) -> dict[str, str]:
     """Return the name that the identifiers of a file in C begin with, by the wanted one."""
-    # of identifiers in C, before "_step" and the like
-    longest_name = 16
-    prefix = "" if wanted[:1].isascii() and wanted[:1].isalpha() else "n_"
-    return identifiers([wanted], prefix, longest_name)
+    first = wanted[:1]
+    prefix = "" if first.isascii() and first.isalpha() else "n_"
+    # room for "_step" and the like
+    return identifiers([wanted], prefix, longest=16)
 
 
 def literal(value: float, suffix: str = "") -> str:
@@ -71,7 +74,7 @@ def literal(value: float, suffix: str = "") -> str:
 
 @cache
 def source_templates() -> Environment:
-    """The templates of source files, without the escapes of HTML."""
+    """Return the templates of source files, without the escapes of HTML."""
     folder = Path(__file__).parent / "templates"
     environment = Environment(
         loader=FileSystemLoader(folder),
@@ -91,7 +94,7 @@ def render_source(template: str, **values: Any) -> bytes:
 
 
 def facts_of(record: Any) -> list[tuple[str, str]]:
-    """The entries of a record that have one value, by label with unit, for a comment."""
+    """Return the entries of a record that have one value, by label with unit, for a comment."""
     rows = (
         (f"{label} [{of.unit}]" if of.unit else label, text(value, of.digits))
         for label, of, value in entries(record)

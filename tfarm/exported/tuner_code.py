@@ -17,7 +17,7 @@ exp of its activation:
 
 with ln 2 = h + l, h of so few bits that k h is exact (Cody and Waite, Software Manual for the Elementary Functions,
 1980), e^r by Taylor's polynomial, coefficients 1/n! rounded to the precision, and 2^k as a product of powers of 1/2.
-What the polynomial leaves out is below a tenth of half a unit in the last place; the largest error is `ULPS` of these
+What the polynomial leaves out is below a tenth of half a unit in the last place; the largest error is 1.5 of these
 units.  A tuner without a guard, whose gain has no upper end and no certificate, is not exported.
 
 Every number has one precision: literals of Python would make doubles of single-precision operands.
@@ -25,6 +25,7 @@ Every number has one precision: literals of Python would make doubles of single-
 
 import hashlib
 import math
+from enum import IntEnum
 from fractions import Fraction
 from importlib.metadata import version
 from typing import Any, NamedTuple
@@ -37,7 +38,8 @@ from tfarm.arrays import Real, Whole
 from tfarm.dsp import Measurement
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
 from tfarm.exact.compiled import compiled, inlined
-from tfarm.exported.controller import INPUT_ERROR, OVERFLOW, REAL, Port, self_test_values
+from tfarm.exported.controller import REAL, Port, self_test_values
+from tfarm.exported.kernel import Status, numbers_of
 from tfarm.exported.result import ANYWAY, Export, ExportTask, names_of
 from tfarm.exported.texts import literal, name_in_c, render_source
 from tfarm.exported.word_length import FEEDFORWARD, FLOATS
@@ -60,16 +62,30 @@ CONSUMER = Consumer(
     none=("reference", "volts"),
 )
 
-# bound of the error of e^x, x from `lowest` to 0
-ULPS = 1.5
-# 35 digits: math.log(2) and its remainder
-LN_2 = Fraction(math.log(2.0)) + Fraction(2319046813846299558, 10**35)
-
-ANGLE, RATE, MOMENT, WANTED_ANGLE, WANTED_RATE, WANTED_MOMENT = range(6)
-# places of the state: the last sample, and e of the one before
-U, E, X, K, E_BEFORE, TORQUE = range(6)
 # exact, and of either precision with another number
 ZERO, ONE = np.array([0.0, 1.0], np.float32)
+
+
+class InputPlace(IntEnum):
+    """Places of the inputs; the feedforward is the last one."""
+
+    ANGLE = 0
+    RATE = 1
+    MOMENT = 2
+    WANTED_ANGLE = 3
+    WANTED_RATE = 4
+    WANTED_MOMENT = 5
+
+
+class StatePlace(IntEnum):
+    """Places of the state: the last sample, and e of the one before."""
+
+    U = 0
+    E = 1
+    X = 2
+    K = 3
+    E_BEFORE = 4
+    TORQUE = 5
 
 
 class TunerConstants(NamedTuple):
@@ -98,40 +114,42 @@ class TunerConstants(NamedTuple):
 
 
 def constants_of_tuner(saved: SavedTuner, real: Any) -> TunerConstants:
-    """The numbers of a tuner in np.float64 or np.float32, the guard rounded inwards.
+    """Return the numbers of a tuner in np.float64 or np.float32, the guard rounded inwards.
 
     Raises ParameterError for a number beyond the range of the precision, and for a tuner without a guard.
     """
     remedy = "a tuner without a guard has no certificate for its gain: train one with --guard time-varying"
     require(saved.guard is not None, "guard_kind", saved.guard_kind, remedy)
+    # 35 digits: math.log(2) and its remainder
+    ln_2 = Fraction(math.log(2.0)) + Fraction(2319046813846299558, 10**35)
     bits, lowest, terms = (42, -708.0, 14) if real is np.float64 else (16, -87.0, 9)
-    high = Fraction(round(LN_2 * 2**bits), 2**bits)
-    scalars = 0.5, lowest, 1.5 * 2 ** np.finfo(real).nmant, 1 / math.log(2.0), high, LN_2 - high
+    high = Fraction(round(ln_2 * 2**bits), 2**bits)
+    scalars = 0.5, lowest, 1.5 * 2 ** np.finfo(real).nmant, 1 / math.log(2.0), high, ln_2 - high
     taylor = np.array([1 / math.factorial(n) for n in range(terms)], dtype=real)
     limits = saved.gain().guard
     names = ("W1", "w2", "scales", "K1", "Kp")
     with np.errstate(over="ignore", under="ignore"):
-        W1, w2, scales, K1, Kp = rounded = [np.array(getattr(saved, name), dtype=real) for name in names]
+        rounded = [np.array(getattr(saved, name), dtype=real) for name in names]
         lo, hi = map(real, limits)
-    lo = np.nextafter(lo, real(math.inf)) if float(lo) < limits.lo else lo
-    hi = np.nextafter(hi, real(0.0)) if float(hi) > limits.hi else hi
+    W1, w2, scales, K1, Kp = rounded
+    if float(lo) < limits.lo:
+        lo = np.nextafter(lo, real(math.inf))
+    if float(hi) > limits.hi:
+        hi = np.nextafter(hi, real(0.0))
     usable = [*(np.isfinite(each).all() for each in rounded), scales.all(), lo < hi]
+    remedy = "beyond the range or the digits of float: export it in double"
     for name, is_usable in zip((*names, "scales", "guard"), usable, strict=True):
-        require(
-            is_usable,
-            name,
-            getattr(saved, name),
-            "beyond the range or the digits of float: export it in double",
-        )
+        require(is_usable, name, getattr(saved, name), remedy)
     share = float(scales.min()) / (2 * scales.size * max(1.0, float(abs(W1).max())))
     largest = real(min(1.0, share) * float(np.finfo(real).max))
-    own = taylor, W1, w2, scales, real(K1), real(Kp), lo, hi, largest, saved.signals == "total"
-    return TunerConstants._make([*(real(float(each)) for each in scalars), *own])
+    own = (taylor, W1, w2, scales, real(K1), real(Kp), lo, hi, largest)
+    rounded_scalars = (real(float(each)) for each in scalars)
+    return TunerConstants._make([*rounded_scalars, *own, saved.signals == "total"])
 
 
 @inlined
 def evaluate_polynomial(x: float, coefficients: Real) -> float:
-    """The sum of coefficients[n] x^n, by Horner's rule."""
+    """Return the sum of coefficients[n] x^n, by Horner's rule."""
     total = coefficients[coefficients.size - 1]
     for n in range(coefficients.size - 2, -1, -1):
         total = total * x + coefficients[n]
@@ -140,7 +158,7 @@ def evaluate_polynomial(x: float, coefficients: Real) -> float:
 
 @compiled
 def exponential(x: float, of: TunerConstants) -> float:
-    """e^x for x <= 0; 0 of NaN, which u, e or x then is too: the step is refused."""
+    """Return e^x for x <= 0; 0 of NaN, which u, e or x then is too: the step is refused."""
     if not x > of.lowest:
         return ZERO
     k = (x * of.inverse + of.shift) - of.shift
@@ -158,14 +176,14 @@ def exponential(x: float, of: TunerConstants) -> float:
 
 @compiled
 def sigmoid(z: float, of: TunerConstants) -> float:
-    """1/(1 + e^-z)."""
+    """Return 1/(1 + e^-z)."""
     small = exponential(-z if z > ZERO else z, of)
     return (ONE if z > ZERO else small) / (ONE + small)
 
 
 @inlined
 def network_output(of: TunerConstants, row: Real) -> float:
-    """K of a row of inputs."""
+    """Return K of a row of inputs."""
     z = ZERO
     for j in range(of.w2.size):
         net = ZERO
@@ -183,23 +201,32 @@ def advance_sample(of: TunerConstants, state: Real, inputs: Real) -> int:
     forward = -1
     for value in inputs:
         if not -of.largest <= value <= of.largest:
-            return INPUT_ERROR
-    x = inputs[MOMENT] if of.is_total else inputs[MOMENT] - inputs[WANTED_MOMENT]
-    servo = of.Kp * (inputs[WANTED_ANGLE] - inputs[ANGLE]) + of.K1 * (inputs[WANTED_RATE] - inputs[RATE])
+            return Status.INPUT_ERROR
+    x = inputs[InputPlace.MOMENT]
+    if not of.is_total:
+        x = x - inputs[InputPlace.WANTED_MOMENT]
+    angle = inputs[InputPlace.WANTED_ANGLE] - inputs[InputPlace.ANGLE]
+    rate = inputs[InputPlace.WANTED_RATE] - inputs[InputPlace.RATE]
+    servo = of.Kp * angle + of.K1 * rate
     u = servo + inputs[forward] if of.is_total else servo
-    row = np.array([u, state[U], state[E], state[E_BEFORE], x, state[X], state[K]])
+    u1 = state[StatePlace.U]
+    e1 = state[StatePlace.E]
+    e2 = state[StatePlace.E_BEFORE]
+    x1 = state[StatePlace.X]
+    gain1 = state[StatePlace.K]
+    row = np.array([u, u1, e1, e2, x, x1, gain1])
     gain = network_output(of, row)
     e = u - gain * x
     torque = (inputs[forward] + servo) - gain * x
     for value in (u, e, x, gain, torque):
         if not -of.largest <= value <= of.largest:
-            return OVERFLOW
-    state[E_BEFORE] = state[E]
-    state[U] = u
-    state[E] = e
-    state[X] = x
-    state[K] = gain
-    state[TORQUE] = torque
+            return Status.OVERFLOW
+    state[StatePlace.E_BEFORE] = e1
+    state[StatePlace.U] = u
+    state[StatePlace.E] = e
+    state[StatePlace.X] = x
+    state[StatePlace.K] = gain
+    state[StatePlace.TORQUE] = torque
     return 0
 
 
@@ -208,7 +235,7 @@ def advance_rows(of: TunerConstants, state: Real, inputs: Real, torque: Real, st
     """Step over rows of inputs."""
     for k in range(status.size):
         status[k] = advance_sample(of, state, inputs[k])
-        torque[k] = state[TORQUE]
+        torque[k] = state[StatePlace.TORQUE]
 
 
 # by identifier in C: the field of a `Measurement`, the meaning, and the unit ("": that of the arm's input)
@@ -234,14 +261,14 @@ class ExportedTuner:
         self.real, _ = FLOATS[precision]
         self.scale = saved.scales[0]
         self.numbers = constants_of_tuner(saved, self.real)
-        self.inputs = {
-            key: of for key, of in INPUTS.items() if not (self.numbers.is_total and key == "r_root_moment")
-        }
+        self.inputs = dict(INPUTS)
+        if self.numbers.is_total:
+            del self.inputs["r_root_moment"]
         self.reset()
 
     def reset(self) -> None:
         """Return to the state before the first sample."""
-        self.state = np.zeros(6, self.real)
+        self.state = np.zeros(len(StatePlace), self.real)
 
     def run(self, inputs: Real) -> tuple[Real, Whole]:
         """Advance over rows of `inputs` (n, inputs); return torques and status (n,), as the C code has them."""
@@ -253,14 +280,16 @@ class ExportedTuner:
         return torque, status
 
     def __call__(self, m: Measurement) -> float:
-        """The torque of a sample; that of the sample before where a number is NaN, infinite or too large."""
+        """Return the torque of a sample; that of the sample before where a number is NaN, infinite or too large."""
         if m.k == 0:
             self.reset()
-        return float(self.run(np.array([[getattr(m, name) for name, _, _ in self.inputs.values()]]))[0][0])
+        row = np.array([getattr(m, name) for name, _, _ in self.inputs.values()])
+        torque, _ = self.run(row[None])
+        return float(torque[0])
 
 
 def c_tuner(task: ExportTask) -> Export:
-    """The files of a trained tuner in C99.
+    """Return the files of a trained tuner in C99.
 
     Raises ParameterError without a tuner, for one of another sampling period, and, unless `anyway`, for one whose gain
     is not certified to vary in its guard on this arm.
@@ -295,11 +324,11 @@ def c_tuner(task: ExportTask) -> Export:
     }
     name = name_in_c(task.name or "tuner")
     (own,) = name.values()
-    return task.exported(tuner_files(task, tuner, own, facts), names_of(name), certainty)
+    return task.export_of(tuner_files(task, tuner, own, facts), names_of(name), certainty)
 
 
 def tuner_files(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[str, str]) -> dict[str, bytes]:
-    """The files by name; constants have the names of `TunerConstants`."""
+    """Return the files by name; constants have the names of `TunerConstants`."""
     of = tuner.numbers
     real, suffix, _ = REAL[task.precision]
     kept: dict[str, Any] = of._asdict()
@@ -315,11 +344,10 @@ def tuner_files(task: ExportTask, tuner: ExportedTuner, name: str, facts: dict[s
         "suffix": suffix,
         "header": "tuner.h",
         "bounds": (),
-        "statuses": {"INPUT_ERROR": INPUT_ERROR, "OVERFLOW": OVERFLOW},
+        "statuses": numbers_of(Status.INPUT_ERROR, Status.OVERFLOW),
         "fields": ports,
         "output": f"{task.case.arm.input} [{task.case.arm.input_unit}]",
         "of": of,
-        "ulps": ULPS,
         "scalars": {key: literal(float(x), suffix) for key, x in kept.items() if isinstance(x, np.floating)},
         "tables": {
             key: [literal(x, suffix) for x in each.ravel().tolist()]

@@ -1,1 +1,15 @@
-"""Measured data against the exact arm: what was measured, and the parameters that explain it."""
+"""Measured data against the exact arm: what was measured, and the numbers of the arm that explain it.
+
+`data`: a measured frequency response, its noise, and its files.
+`recording`: records over time, runs under a controller, and the frequency response of a record.
+`resonances`: poles fitted to the peaks of a response.
+`decays`: frequencies and damping ratios of a decay.
+`ratio`: the exact response of one signal over another.
+`overlay`: a measured response compared with the exact one, mode by mode.
+`model`: free numbers of an arm, and the residuals that they leave.
+`solve`: the search for the least sum of squares.
+`intervals`: intervals of the numbers, and the directions that the data leave open.
+`fit`: the fitted arm, and arms drawn from its posterior.
+`misses`: responses that the fitted curve misses, and the changes that would help.
+`posterior`: the distribution of the fitted numbers, and their scatter between records.
+"""

@@ -39,8 +39,6 @@ from tfarm.schema import Column, Quantity, Table
 
 # of every interval of a fit: the usual one
 CONFIDENCE = 0.95
-# of |H|: no measured response is better known than that, whatever its coherence
-LEAST_SHARE = 1e-5
 
 
 def require_all(key: str, values: Real, is_good: NDArray[np.bool_], remedy: str) -> None:
@@ -89,9 +87,11 @@ class Measured:
             "frequency", w, np.isfinite(self.values), "has a value that is no number; leave the row out"
         )
         require(self.values.any(), f"{self.name} values", 0.0, nothing)
-        if (sigma := self.sigma) is not None:
+        sigma = self.sigma
+        if sigma is not None:
             require_all("sigma", sigma, (sigma > 0) & np.isfinite(sigma), "a standard deviation is positive")
-        if (coherence := self.coherence) is not None:
+        coherence = self.coherence
+        if coherence is not None:
             require_all("coherence", coherence, (coherence >= 0) & (coherence <= 1), "between 0 and 1")
             require(coherence.any(), "coherence", 0.0, f"{nothing}; leave it out")
 
@@ -135,32 +135,27 @@ class Measured:
     @property
     def csv_table(self) -> Table:
         """A row a frequency, in the columns that `read_measured` reads."""
-        columns = {
-            "re": self.values.real,
-            "im": self.values.imag,
-            "sigma": self.sigma,
-            "coherence": self.coherence,
-        }
-        titles = {"re": f"Re {self.name}", "im": f"Im {self.name}"}
         rows = [Column("hz", "frequency", "Hz", of=self.omega / HERTZ, digits=singly(general, 9))]
-        rows += [
-            Column(key, titles.get(key, key), of=x, digits=singly(general, 6))
-            for key, x in columns.items()
-            if x is not None
-        ]
-        rows += [Column("averages", "averages", of=[self.averages] * self.points)] * (
-            self.averages is not None
-        )
+        for key, title, of in (
+            ("re", f"Re {self.name}", self.values.real),
+            ("im", f"Im {self.name}", self.values.imag),
+            ("sigma", "sigma", self.sigma),
+            ("coherence", "coherence", self.coherence),
+        ):
+            if of is not None:
+                rows.append(Column(key, title, of=of, digits=singly(general, 6)))
+        if self.averages is not None:
+            rows.append(Column("averages", "averages", of=[self.averages] * self.points))
         return Table(columns=tuple(rows))
 
 
 def in_parts(values: Complex) -> Real:
-    """Real parts, then imaginary ones, along the last axis: (..., n) becomes (..., 2 n)."""
+    """Return real parts, then imaginary ones, along the last axis: (..., n) becomes (..., 2 n)."""
     return np.concatenate([values.real, values.imag], axis=-1)
 
 
 def rms(values: NDArray[Any]) -> float:
-    """The root mean square."""
+    """Return the root mean square."""
     return float(np.sqrt((abs(values) ** 2).mean()))
 
 
@@ -192,22 +187,30 @@ class Noise:
         ),
     ]
 
+    @property
+    def is_finite(self) -> NDArray[np.bool_]:
+        """Whether anything was measured, at each frequency (n,)."""
+        return np.isfinite(self.sigma)
+
 
 def noise_of(data: Measured) -> Noise:
-    """The noise of a measured response.
+    """Return the noise of a measured response.
 
     With coherence g^2 of an estimate from n averages the relative deviation of a part is sqrt((1 - g^2)/(2 n g^2))
     (Bendat and Piersol 2010, (9.90)); without n it is known up to a factor.  With nothing given it is the scatter of
     the values about a parabola through their neighbours.
     """
+    # of |H|: no measured response is better known than that, whatever its coherence
+    least_share = 1e-5
     if data.sigma is not None:
         return Noise(sigma=data.sigma, is_known=True, source="sigma of the file")
     if data.coherence is None:
-        return Noise(sigma=_scatter(data.values), is_known=False, source="scatter of the values")
+        sigma = scatter_of(data.values, least_share)
+        return Noise(sigma=sigma, is_known=False, source="scatter of the values")
     g = data.coherence
     size = abs(data.values)
     with np.errstate(divide="ignore"):
-        share = np.maximum(np.sqrt((1.0 - g) / (2.0 * (data.averages or 1) * g)), LEAST_SHARE)
+        share = np.maximum(np.sqrt((1.0 - g) / (2.0 * (data.averages or 1) * g)), least_share)
     # a share of nothing is no deviation
     sigma = np.where((g == 0) | (size == 0), np.inf, size * share)
     if data.averages is None:
@@ -215,14 +218,14 @@ def noise_of(data: Measured) -> Noise:
     return Noise(sigma=sigma, is_known=True, source=f"coherence of {data.averages} averages")
 
 
-def _scatter(values: NDArray[Any]) -> Real:
-    """The deviation of each value from a parabola through its four neighbours, smoothed.
+def scatter_of(values: NDArray[Any], least_share: float) -> Real:
+    """Return the deviation of each value from a parabola through its four neighbours, smoothed.
 
-    It is LEAST_SHARE of the value at least.
+    It is the least share of the value at least.
     """
     size = abs(values)
     if size.size < 5:
-        return np.maximum(size, LEAST_SHARE * size.max())
+        return np.maximum(size, least_share * size.max())
     # x_k less the parabola through x_(k-2), x_(k-1), x_(k+1), x_(k+2): weights -1/6, 2/3, 2/3, -1/6 of these
     weights = np.array([1, -4, 6, -4, 1]) / 6
     inside = size[2:-2]
@@ -231,13 +234,11 @@ def _scatter(values: NDArray[Any]) -> Real:
     typical = np.median(away / inside[inside > 0]) / 1.17741 if away.size else 1.0
     # which a value of 0 is taken for
     least = max(1e-3 * np.median(size), 1e-6 * size.max())
-    return np.maximum(size, least) * max(typical, LEAST_SHARE)
+    return np.maximum(size, least) * max(typical, least_share)
 
 
 # of a record; an hour of two signals at 1 kHz as text has 150 MB
 MOST_RECORD_BYTES = 256 * 1024 * 1024
-# its unit, and rad/s in one
-FREQUENCIES = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}
 VALUES = ("re", "im", "abs", "db", "deg")
 # as it is written in a cell or an option
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -259,7 +260,7 @@ class Sheet:
 
 
 def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
-    """The columns of a text file.
+    """Return the columns of a text file.
 
     Raises ParameterError naming the line for a missing or doubled name, a row of another length, or what is no finite
     number; naming `key` where the file cannot be read.
@@ -282,7 +283,7 @@ def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
 
 
 def _header(cells: Sequence[str]) -> dict[str, str]:
-    """The unit of each column by its name; a first line of numbers is a missing header."""
+    """Return the unit of each column by its name; a first line of numbers is a missing header."""
     units: dict[str, str] = {}
     for place, cell in enumerate(cells, start=1):
         name, unit = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell, re.DOTALL).groups("")  # type: ignore[union-attr]
@@ -304,7 +305,7 @@ def _cell(text: str) -> str:
 
 
 def _numbers(names: Sequence[str], rows: Sequence[tuple[int, str]], separator: str) -> Real:
-    """The cells (rows, columns) of numbered lines, by NumPy; the line of a row that is none is named."""
+    """Return the cells (rows, columns) of numbered lines, by NumPy; the line of a row that is none is named."""
     for line, text in rows:
         if (count := text.count(separator) + 1) != len(names):
             raise ParameterError(
@@ -320,14 +321,14 @@ def _numbers(names: Sequence[str], rows: Sequence[tuple[int, str]], separator: s
 
 
 def _number(text: str) -> float:
-    """The finite number that a cell holds, with a decimal point or comma; nan for anything else."""
+    """Return the finite number that a cell holds, with a decimal point or comma; nan for anything else."""
     plain = _cell(text).replace(",", ".")
     value = float(plain) if re.fullmatch(NUMBER, plain, re.ASCII) else math.nan
     return value if math.isfinite(value) else math.nan
 
 
 def data_of(text: str, key: str = "--data") -> Measured:
-    """The measured response that the command line means by "tip_acceleration/hub_angle=sweep.csv".
+    """Return the measured response that the command line means by "tip_acceleration/hub_angle=sweep.csv".
 
     Raises ParameterError for another form, a signal that is none, and for what `read_measured` refuses.
     """
@@ -343,7 +344,7 @@ def data_of(text: str, key: str = "--data") -> Measured:
 
 
 def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Measured:
-    """The response `output`/`input` of a CSV file, or of a UFF file with a data set 58 (its number after a #).
+    """Return the response `output`/`input` of a CSV file, or of a UFF file with a data set 58 (its number after a #).
 
     Raises ParameterError, naming file and line, for a header without frequency or value, for frequencies that are
     repeated or not sorted, a coherence that is 0 everywhere, and for what else no measurement can be.
@@ -386,14 +387,16 @@ def check_signal(name: str, key: str) -> None:
 
 # ------------------------------------------------------------ CSV
 def _frequencies(sheet: Sheet) -> Real:
-    """The frequencies [rad/s], once the header is known to be one and they ascend."""
-    known = (*FREQUENCIES, *VALUES, "coherence", "sigma", "averages")
+    """Return the frequencies [rad/s], once the header is known to be one and they ascend."""
+    # its unit, and rad/s in one
+    frequencies = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}
+    known = (*frequencies, *VALUES, "coherence", "sigma", "averages")
     for name in sheet.columns:
         require(name in known, "header", name, did_you_mean(name.lower(), known))
-    found = [name for name in FREQUENCIES if name in sheet.columns]
+    found = [name for name in frequencies if name in sheet.columns]
     require(len(found) == 1, "header", [*sheet.columns], "one column of frequencies: hz or rad_s")
     (name,) = found
-    unit, scale = FREQUENCIES[name]
+    unit, scale = frequencies[name]
     own = sheet.units[name]
     require(own.lower() in ("", unit.lower()), f"unit of {name}", own, f"{name} is in {unit}")
     frequency = sheet.columns[name]
@@ -407,7 +410,7 @@ def _frequencies(sheet: Sheet) -> Real:
 
 
 def _values(sheet: Sheet) -> Complex:
-    """The complex response, of whichever two columns there are."""
+    """Return the complex response, of whichever two columns there are."""
     pair = tuple(name for name in VALUES if name in sheet.columns)
     remedy = "one pair of columns for the value: re, im or abs, deg or db, deg; leave others out"
     require(pair in (("re", "im"), ("abs", "deg"), ("db", "deg")), "header", [*sheet.columns], remedy)
@@ -424,7 +427,7 @@ def _values(sheet: Sheet) -> Complex:
 
 # ------------------------------------------------------------ UFF
 def _of_uff(path: str, number: str, output: str, input: str) -> Measured:
-    """The response of a UFF file: the only one, or that of a number from 1 in their order there."""
+    """Return the response of a UFF file: the only one, or that of a number from 1 in their order there."""
     key = f"{output}/{input}"
     data = read_file(path, MOST_RECORD_BYTES, key=key, what="a .uff file")
     remedy = "is not installed, and reads UFF files: pip install 'tfarm[uff]', or export the response as CSV"
@@ -439,7 +442,7 @@ def _of_uff(path: str, number: str, output: str, input: str) -> Measured:
         place = int(number or 1)
         require(1 <= place <= count, "data set", place, f"from 1 to {count}, the responses of the file")
         omega = 2 * np.pi * np.asarray(found[f"x{place - 1}"], dtype=float)
-        values: NDArray[Any] = np.asarray(found[f"data{place - 1}"], dtype=complex)
+        values = found[f"data{place - 1}"]
         # the line at 0 Hz that spectra begin with
         kept = slice(int(omega.size > 0 and omega[0] == 0), None)
         return Measured(

@@ -38,8 +38,11 @@ if TYPE_CHECKING:
 
 # probability below which residuals are called correlated
 NOT_WHITE = 1e-3
-# parameters of a mode: sigma, w, a, b; the constant c is the last
-EACH = 4
+
+
+def count_parameters(modes: int) -> int:
+    """Return the number of parameters of that many modes: the sigma, w, a and b of each, and the constant c."""
+    return 4 * modes + 1
 
 
 class DecayMode(NamedTuple):
@@ -134,7 +137,7 @@ class RingdownFit:
 def fit_ringdown(
     recording: Recording, name: str, *, start: float | None = None, stop: float | None = None, modes: int = 1
 ) -> RingdownFit:
-    """Frequency and damping of the decay of one signal between two times [s] of the record.
+    """Return frequency and damping of the decay of one signal between two times [s] of the record.
 
     Raises ParameterError for a signal or times that are not there and for too few samples, ConvergenceError where the
     oscillations are not found.
@@ -160,15 +163,18 @@ def fit_ringdown(
             "by their autocovariance, and may be too narrow, above all if the residuals are no noise"
         )
     spread = found.covariance(is_white=white >= NOT_WHITE)
-    halves = zip(np.array_split(t, [t.size // 2]), np.array_split(y, [t.size // 2]), strict=True)
-    w, variance = np.swapaxes([by_part(*half, found.poles) for half in halves], 0, 1)
-    apart = np.sqrt(variance.sum(axis=0))
+    middle = t.size // 2
+    w1, variance1 = by_part(t[:middle], y[:middle], found.poles)
+    w2, variance2 = by_part(t[middle:], y[middle:], found.poles)
+    apart = np.sqrt(variance1 + variance2)
     # by more than four standard deviations
-    is_drifting = abs(np.subtract(*w)) > 4.0 * apart + rounding * found.poles.imag
+    is_drifting = abs(w1 - w2) > 4.0 * apart + rounding * found.poles.imag
     rows = []
     for number, n in enumerate(np.argsort(-found.energy, kind="stable").tolist(), start=1):
-        first, second = (w[:, n] / HERTZ).tolist()
-        rows.append(found.mode(n, number, spread, (first, second) if np.isfinite(apart[n]) else (None, None)))
+        first = float(w1[n]) / HERTZ
+        second = float(w2[n]) / HERTZ
+        halves = (first, second) if np.isfinite(apart[n]) else (None, None)
+        rows.append(found.mode(n, number, spread, halves))
         if is_drifting[n]:
             notes.append(
                 f"mode {number} rings at {first:.4g} Hz in its first half, {second:.4g} Hz in its "
@@ -198,7 +204,7 @@ def _samples(
     # within half a millionth of a sample: rounding of times
     kept = abs(2 * times - low - high) <= high - low + 1e-6 * recording.period
     require(1 <= modes <= 20, "--modes", modes, "a whole number from 1 to 20")
-    least = 4 * (EACH * modes + 1)
+    least = 4 * count_parameters(modes)
     taken = f"{kept.sum()} samples from {low:g} to {high:g} s; {modes} modes take {least}"
     remedy = f"{taken} (the record goes from {times[0]:g} to {times[-1]:g} s)"
     require(kept.sum() >= least, "--from", low, remedy, recording.source)
@@ -207,16 +213,16 @@ def _samples(
 
 
 def by_part(t: Real, y: Real, poles: Complex) -> tuple[Real, Real]:
-    """w by a part of the record, from the whole's poles on, and its variance.
+    """Return w by a part of the record, from the whole's poles on, and its variance.
 
     Where the part does not determine it, w of the whole and an infinite variance.
     """
     w = np.asarray(poles.imag, float)
     variance = np.full(w.size, np.inf)
-    found = nearest_sum(t - t[0], y, poles) if y.size > 2 * (EACH * w.size + 1) else None
+    found = nearest_sum(t - t[0], y, poles) if y.size > 2 * count_parameters(w.size) else None
     if found is not None:
         spread = found.covariance(is_white=whiteness(found.e) >= NOT_WHITE)
-        _, of_w, of_a, of_b = np.diag(spread)[:-1].reshape(EACH, w.size)
+        _, of_w, of_a, of_b = np.diag(spread)[:-1].reshape(4, w.size)
         # deviations of the amplitude of an oscillation that is determined: noise has 4
         variance = np.where(found.amplitude**2 > 8.0**2 * (of_a + of_b) / 2, of_w, np.inf)
         w = np.asarray(found.poles.imag, float)
@@ -224,7 +230,7 @@ def by_part(t: Real, y: Real, poles: Complex) -> tuple[Real, Real]:
 
 
 def basis(poles: Complex, t: Real) -> Real:
-    """The decaying cosines and sines of the poles (n,) at times (samples,), and 1: (samples, 2 n + 1)."""
+    """Return the decaying cosines and sines of the poles (n,) at times (samples,), and 1: (samples, 2 n + 1)."""
     waves = np.exp(np.clip(np.outer(t, poles.real), -700, 700) + 1j * np.outer(t, poles.imag))
     return np.c_[waves.real, waves.imag, np.ones(t.size)]
 
@@ -262,10 +268,10 @@ class DampedSum:
     @property
     def freedom(self) -> int:
         """Samples less parameters."""
-        return self.e.size - EACH * self.poles.size - 1
+        return self.e.size - count_parameters(self.poles.size)
 
     def covariance(self, *, is_white: bool) -> Real:
-        """Of the parameters (4 n + 1, 4 n + 1); the Jacobian's columns are scaled for the inverse's sake."""
+        """Return that of the parameters (4 n + 1, 4 n + 1); columns are scaled for the inverse's sake."""
         scale = np.sqrt((self.jacobian**2).sum(axis=0))
         J = self.jacobian / scale
         e = self.e
@@ -274,7 +280,7 @@ class DampedSum:
         return bread @ meat @ bread / np.outer(scale, scale)
 
     def mode(self, n: int, number: int, covariance: Real, halves: Sequence[float | None]) -> DecayMode:
-        """Mode n by its number, with intervals (Student's t); d zeta = (w^2 d sigma - sigma w d w)/|s|^3."""
+        """Return mode n by its number, with intervals (Student's t); d zeta = (w^2 d sigma - sigma w d w)/|s|^3."""
         s = complex(self.poles[n])
         size = abs(s)
         places = [n, n + self.poles.size]
@@ -294,7 +300,10 @@ class DampedSum:
 
 
 def nearest_sum(t: Real, y: Real, start: Complex) -> DampedSum | None:
-    """The sum with the least squares next to the poles of a start; None where that is no oscillation in the record."""
+    """Return the sum with the least squares next to the poles of a start.
+
+    None where that is no oscillation in the record.
+    """
     period = t[1] - t[0]
 
     def poles_at(x: Real) -> Complex:
@@ -312,7 +321,7 @@ def nearest_sum(t: Real, y: Real, start: Complex) -> DampedSum | None:
 
 
 def starting_poles(t: Real, y: Real, modes: int) -> Complex:
-    """Poles to start from: of ESPRIT's at several rates of sampling those with the least residuals, one by one.
+    """Return poles to start from: of ESPRIT's at several rates of sampling those with the least residuals, one by one.
 
     Of a rate they are ln of the eigenvalues by which the signal subspace of the Hankel matrix moves in one sample.
     There are fewer where not enough poles turn half a turn in the record, and neither die in a sample nor explode.
@@ -343,7 +352,7 @@ def starting_poles(t: Real, y: Real, modes: int) -> Complex:
 
 
 def _meat(J: Real, e: Real) -> Real:
-    """J' R J with the residuals' autocovariances r_k, tapered (1 - k/M), M twice the last significant lag."""
+    """Return J' R J with the residuals' autocovariances r_k, tapered (1 - k/M), M twice the last significant lag."""
     r = _autocovariance(e)
     most = max(2, e.size // 3)
     # deviations, 1/sqrt(n), of an autocorrelation of white noise
@@ -354,7 +363,7 @@ def _meat(J: Real, e: Real) -> Real:
 
 
 def whiteness(e: Real) -> float:
-    """The probability of autocorrelations as large as these in white noise (Ljung and Box 1978), of the first lags."""
+    """Return the probability of first autocorrelations as large as these in white noise (Ljung and Box 1978)."""
     r = _autocovariance(e)
     n = e.size
     if r[0] == 0:

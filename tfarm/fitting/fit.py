@@ -27,17 +27,16 @@ from tfarm.digits import join_words
 from tfarm.errors import ConvergenceError, one_line, require
 from tfarm.files import is_standard_output, write_file
 from tfarm.fitting.data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of, rms
+from tfarm.fitting.intervals import BetterError, Fitted, confidence_intervals
 from tfarm.fitting.misses import Miss, Remedy, misses_of, remedies_of
 from tfarm.fitting.model import SENSOR_DELAY, SENSOR_GAIN, FitResponse, Problem, RingMode, free_parameters
-from tfarm.fitting.overlay import ResonanceShift, ratio_of, resonance_shifts
+from tfarm.fitting.overlay import ResonanceShift, resonance_shifts
 from tfarm.fitting.posterior import SUFFIX, Posterior, Repeats, posterior_of, repeats
+from tfarm.fitting.ratio import ratio_of
 from tfarm.fitting.solve import (
     FIT_SEED,
-    BetterError,
-    Fitted,
     Solution,
     best_solution,
-    confidence_intervals,
     is_explained,
     nearest_minimum,
     sum_of_squares,
@@ -120,7 +119,7 @@ class Fit(Solution):
         for number, one in enumerate(self.responses):
             omega = np.unique(np.r_[np.geomspace(*one.band, 1200), one.omega])
             problem = self.problem.at(number, omega)
-            yield omega, problem.computed(0 * self.point)[0], problem.computed(self.point)[0]
+            yield omega, problem.compute(0 * self.point)[0], problem.compute(self.point)[0]
 
     @property
     def response_list(
@@ -187,7 +186,7 @@ class Fit(Solution):
         """The root mean square of ln(computed/measured), complex, over all values; None where there are none."""
         if not self.responses:
             return None
-        pairs = zip(self.problem.computed(self.point), self.responses, strict=True)
+        pairs = zip(self.problem.compute(self.point), self.responses, strict=True)
         return rms(np.concatenate([np.log(H / each.values)[each.values != 0] for H, each in pairs]))
 
     @property
@@ -292,7 +291,7 @@ def fit(
     profile: bool = True,
     progress: Progress | None = None,
 ) -> Fit:
-    """The arm whose free numbers explain the measured responses best.
+    """Return the arm whose free numbers explain the measured responses best.
 
     `free` are keys of the arm's TOML file, and "gain" and "delay" of each response's sensor; `start`, `bounds` and
     `priors` (mean, deviation) are by key, in SI units; `rings` are decays of single modes.  With `profile` each
@@ -325,7 +324,7 @@ def fit(
 
 
 def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
-    """The arm's assumptions, those that name a fitted number marked as of the start, then the fit and its data."""
+    """Return the arm's assumptions, marked where they name a fitted number, then the fit and its data."""
     # characters of a file in an assumption
     longest_name = 200
     family = fit.problem.family
@@ -347,7 +346,7 @@ def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
 
 
 def is_named(key: str, value: float, text: str) -> bool:
-    """Whether a text names a number of an arm: by its label, by its symbol (I_h =), or by its value and unit."""
+    """Return whether a text names a number of an arm: by its label, by its symbol (I_h =), or by its value and unit."""
     of = file_key(key)
     *words, last = of.label.split()
     # a symbol ends a label: I_h, Kt
@@ -359,7 +358,7 @@ def is_named(key: str, value: float, text: str) -> bool:
 
 
 def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: Any, rings: Any) -> Problem:
-    """The search: the arm's numbers, then the sensors' own, one of a kind for each response."""
+    """Return the search: the arm's numbers, then the sensors' own, one of a kind for each response."""
     must_be_arm(arm)
     data = tuple(data) if isinstance(data, Iterable) and not isinstance(data, str) else (data,)
     for each in data:
@@ -424,9 +423,9 @@ class ResponseBand(NamedTuple):
 
 def response_band(fit: Fit, arms: Sequence[Arm], output: str) -> ResponseBand:
     """Return the band of a response over these arms, in the range of all measurements."""
-    ends = [end for each in fit.responses for end in each.band]
+    bands = np.array([each.band for each in fit.responses])
     # about one frequency to a pixel
-    omega = np.geomspace(min(ends), max(ends), 800)
+    omega = np.geomspace(bands.min(), bands.max(), 800)
     best, *others = (abs(transfer(each, output)(1j * omega)) for each in (fit.arm, *arms))
     return ResponseBand(omega, best, np.min(others, axis=0), np.max(others, axis=0))
 

@@ -70,14 +70,14 @@ def misses_of(found: Solution) -> tuple[Miss, ...]:
     """Return the responses that a solution misses; none where noise of known size explains it."""
     if is_explained(found):
         return ()
-    pairs = zip(found.problem.responses, found.problem.computed(found.point), strict=True)
+    pairs = zip(found.problem.responses, found.problem.compute(found.point), strict=True)
     return tuple(miss for one, H in pairs if (miss := _miss(one, H)) is not None)
 
 
 def _miss(one: FitResponse, computed: Complex) -> Miss | None:
     """Return how one response is missed, None where it is not."""
     data = one.data
-    kept = np.isfinite(one.noise.sigma) & (data.values != 0)
+    kept = one.noise.is_finite & (data.values != 0)
     omega = data.omega[kept]
     ratio = computed[kept] / data.values[kept]
     if omega.size < 2:
@@ -115,7 +115,7 @@ def remedies_of(found: Solution) -> tuple[Remedy, ...]:
     return tuple(remedy for _, remedy in sorted(tried, key=lambda each: each[0]))
 
 
-def _searched(problem: Problem) -> Solution:
+def search_without_miss(problem: Problem) -> Solution:
     """Return the solution of a changed search, which ends where none is missed and noise may explain the rest."""
     return best_solution(problem, lambda there: is_explained(there) is not False and not misses_of(there))
 
@@ -126,20 +126,18 @@ def _tries(found: Solution) -> Iterator[tuple[str, Solution]]:
     for key, unit in ((SENSOR_GAIN, ""), (SENSOR_DELAY, " s")):
         if problem.with_sensors((key,)) == problem:
             continue
-        there = _searched(problem.with_sensors((key,)))
+        there = search_without_miss(problem.with_sensors((key,)))
         values = [there.problem.value(there.point, getattr(each, key)) for each in there.problem.responses]
         yield f"a free {key} (--free {key}): {join_words([f'{each:.4g}{unit}' for each in values])}", there
         if min(values) < 0 and key == SENSOR_GAIN:
             pairs = list(zip(problem.responses, values, strict=True))
             names = [each.data.name for each, value in pairs if value < 0]
-            turned = (
-                replace(each, data=replace(each.data, values=np.sign(x) * each.data.values))
-                for each, x in pairs
-            )
-            yield (
-                f"the other sign of {join_words(names)}",
-                _searched(replace(problem, responses=tuple(turned))),
-            )
+            turned = []
+            for each, x in pairs:
+                data = replace(each.data, values=np.sign(x) * each.data.values)
+                turned.append(replace(each, data=data))
+            there = search_without_miss(replace(problem, responses=tuple(turned)))
+            yield f"the other sign of {join_words(names)}", there
     yield from _beyond_bounds(found)
 
 
@@ -157,7 +155,9 @@ def _beyond_bounds(found: Solution) -> Iterator[tuple[str, Solution]]:
         for each, free, at_end in zip(problem.of_the_arm, unbound, is_at_end, strict=False)
     ]
     if tuple(numbers) != problem.of_the_arm:
-        there = _searched(replace(problem, parameters=(*numbers, *problem.parameters[len(numbers) :])))
+        there = search_without_miss(
+            replace(problem, parameters=(*numbers, *problem.parameters[len(numbers) :]))
+        )
         rows = zip(numbers, problem.of_the_arm, there.point.tolist(), strict=False)
         values = [f"{each.key} = {each.value(x):.6g}" for each, before, x in rows if each != before]
         yield f"no bound of {join_words(values)}", there

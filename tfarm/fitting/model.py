@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 
@@ -36,11 +36,6 @@ from tfarm.spectrum import modes
 from tfarm.spectrum.box import newton
 from tfarm.spectrum.table import first_frequency
 
-# times or a part of it: beyond, a search has lost its way, or the data say nothing
-FARTHEST_FROM_START = 1e4
-# of a derivative by differences: the rounding of a float over it is 1e-10, its square below
-COORDINATE_STEP = 2.0**-20
-
 
 @frozen
 class Parameter:
@@ -55,21 +50,23 @@ class Parameter:
     high: float
     size: float = 0.0
     prior: tuple[float, float] | None = None
+    # times the start, or a part of it: beyond, a search has lost its way, or the data say nothing
+    farthest: ClassVar[float] = 1e4
 
     def value(self, coordinate: float) -> float:
-        """The number at a coordinate of the search, 0 at the start."""
+        """Return the number at a coordinate of the search, 0 at the start."""
         if self.size:
             return self.start + self.size * coordinate
         return self.start * math.exp(coordinate)
 
     def coordinate(self, value: float) -> float:
-        """The coordinate of a number."""
+        """Return the coordinate of a number."""
         if self.size:
             return (value - self.start) / self.size
         return math.log(value / self.start)
 
     def per_coordinate(self, value: float) -> float:
-        """The change of a number by a coordinate."""
+        """Return the change of a number by a coordinate."""
         return self.size or abs(value)
 
     @property
@@ -77,15 +74,17 @@ class Parameter:
         """Of the coordinate."""
         if self.size:
             return self.coordinate(self.low), self.coordinate(self.high)
-        shares = np.clip(
-            [self.low / self.start, self.high / self.start], 1 / FARTHEST_FROM_START, FARTHEST_FROM_START
-        )
+        ends = (self.low / self.start, self.high / self.start)
+        shares = np.clip(ends, 1 / self.farthest, self.farthest)
         return math.log(shares.min()), math.log(shares.max())
 
     def ends(self, coordinates: Sequence[float]) -> list[float | None]:
-        """The numbers at the ends of an interval, the lower first; None where only the reach of the search ended it."""
+        """Return the numbers at the ends of an interval, the lower first.
+
+        None where only the reach of the search ended it.
+        """
         # a search that comes nearer to its reach has ended there
-        farthest = math.inf if self.size else math.log(FARTHEST_FROM_START) - 1e-6
+        farthest = math.inf if self.size else math.log(self.farthest) - 1e-6
         found = [self.value(each) if abs(each) < farthest else None for each in coordinates]
         return found if self.start > 0 or self.size else found[::-1]
 
@@ -98,7 +97,7 @@ def free_parameters(
     bounds: Mapping[str, tuple[float, float]],
     priors: Mapping[str, tuple[float, float]],
 ) -> tuple[KeyedArms, tuple[Parameter, ...]]:
-    """The family of an arm whose numbers under `keys` are free, and these numbers.
+    """Return the family of an arm whose numbers under `keys` are free, and these numbers.
 
     Each starts where `start` has it, else at the arm's own value, or where that is 0 at a hundredth of a typical one.
     Raises ParameterError for a key that is none or is not free, and for bounds or a start that leave no room.
@@ -129,7 +128,7 @@ def free_parameters(
 
 
 def _typical(arm: Arm, key: str, own: float) -> float:
-    """A hundredth of a typical value, for a number that is 0, or a hundred times it for one that is infinite."""
+    """Return a hundredth of a typical value, for a number that is 0, or a hundred times it for one that is infinite."""
     w1 = first_frequency(arm)
     inertia = arm.turned_inertia if math.isfinite(arm.turned_inertia) else arm.carried_inertia
     EI = arm.link.EI
@@ -166,7 +165,7 @@ class RingMode(NamedTuple):
 
 
 def mode_of(text: str) -> RingMode:
-    """The decay that the command line means by "1=2.52hz,0.006".  Raises ParameterError for another form.
+    """Return the decay that the command line means by "1=2.52hz,0.006".  Raises ParameterError for another form.
 
     The deviation is by default 0.2 % of a frequency, and 10 % of a ratio.
     """
@@ -188,7 +187,7 @@ def mode_of(text: str) -> RingMode:
 
 
 def eigenvalue(arm: Arm, number: int) -> complex:
-    """The eigenvalue s [1/s] of a flexible mode, by Newton's method.
+    """Return the eigenvalue s [1/s] of a flexible mode, by Newton's method.
 
     It starts from the undamped natural frequency; ConvergenceError where a damped mode does not ring near that.
     """
@@ -220,15 +219,15 @@ class FitResponse:
     @property
     def size(self) -> int:
         """How many real residuals it has: two a frequency at which something was measured."""
-        return 2 * np.isfinite(self.noise.sigma).sum()
+        return 2 * self.noise.is_finite.sum()
 
     def over_deviation(self, values: Complex) -> Real:
-        """Values at its frequencies over their deviations: real parts, then imaginary ones, of what was measured."""
-        kept = np.isfinite(self.noise.sigma)
+        """Return values at its frequencies over their deviations, in parts, of what was measured."""
+        kept = self.noise.is_finite
         return in_parts(values[kept] / self.noise.sigma[kept])
 
     def at(self, omega: Real, values: Complex, sigma: Real) -> FitResponse:
-        """The response at other frequencies."""
+        """Return the response at other frequencies."""
         data = replace(self.data, omega=omega, values=values, sigma=None, coherence=None)
         return replace(self, data=data, noise=replace(self.noise, sigma=sigma))
 
@@ -267,28 +266,31 @@ class Problem:
         return self.inside(np.zeros(len(self.parameters)))
 
     def inside(self, point: Real, by: float = 1e-9) -> Real:
-        """The point, or the nearest one by that inside the bounds."""
+        """Return the point, or the nearest one by that inside the bounds."""
         low, high = self.bounds
         return np.clip(point, low + by, high - by)
 
     def arm(self, point: Real) -> Arm:
-        """The arm at a point."""
+        """Return the arm at a point."""
         return self.family.at(
             {each.key: each.value(x) for each, x in zip(self.of_the_arm, point.tolist(), strict=False)}
         )
 
     def value(self, point: Real, place: int) -> float:
-        """The number of that place in the vector at a point."""
+        """Return the number of that place in the vector at a point."""
         return self.parameters[place].value(float(point[place]))
 
     # ------------------------------------------------------------ responses
 
-    def computed(self, point: Real) -> list[Complex]:
-        """Each response at its own frequencies."""
+    def compute(self, point: Real) -> list[Complex]:
+        """Return each response at its own frequencies."""
         return [(each.N / each.D) for each in self.fractions(point)]
 
     def fractions(self, point: Real, share: float = 0.0) -> list[Fraction]:
-        """Each response at s = (i + share) w; those of one grid of frequencies and one drive are computed together."""
+        """Return each response at s = (i + share) w.
+
+        Those of one grid of frequencies and one drive are computed together.
+        """
         arm = self.arm(point)
         grids: dict[tuple[bytes, str], set[str]] = {}
         keys = []
@@ -317,7 +319,7 @@ class Problem:
         return found
 
     def with_sensors(self, free: Sequence[str]) -> Problem:
-        """The problem with "gain" or "delay" of each sensor free, too."""
+        """Return the problem with "gain" or "delay" of each sensor free, too."""
         own = [*self.parameters]
         responses = []
         for n, each in enumerate(self.responses, start=1):
@@ -331,14 +333,14 @@ class Problem:
         return replace(self, parameters=tuple(own), responses=tuple(responses))
 
     def at(self, number: int, omega: Real) -> Problem:
-        """The problem of one of its responses alone, at other frequencies: for curves."""
+        """Return the problem of one of its responses alone, at other frequencies: for curves."""
         one = self.responses[number].at(omega, np.ones(omega.size, complex), np.ones(omega.size))
         return replace(self, responses=(one,), rings=())
 
     # ------------------------------------------------------------ residuals
 
     def residuals(self, point: Real) -> Real:
-        """(size,): real and imaginary parts of computed less measured over their deviations, then decays and priors."""
+        """Return computed less measured over their deviations (size,), then the residuals of decays and priors."""
         fractions, others = self._terms(point)
         pairs = zip(fractions, self.responses, strict=True)
         return np.concatenate(
@@ -346,20 +348,21 @@ class Problem:
         )
 
     def jacobian(self, point: Real) -> Real:
-        """(size, parameters): the derivatives of the residuals."""
+        """Return the derivatives of the residuals (size, parameters)."""
         here = self._terms(point)
-        return np.stack(
-            [self._slope(here, point, step) for step in COORDINATE_STEP * np.eye(point.size)], axis=1
-        )
+        # the rounding of a float over it is 1e-10, its square below
+        size = 2.0**-20
+        return np.stack([self._slope(here, point, step) for step in size * np.eye(point.size)], axis=1)
 
     def _slope(self, here: tuple[list[Fraction], Real], point: Real, step: Real) -> Real:
-        """The derivatives along one coordinate; from the arm itself where there is none on one side."""
+        """Return the derivatives along one coordinate; from the arm itself where there is none on one side."""
         sides = [here, here]
+        size = float(step.max())
         width = 0.0
         for side, to in enumerate((point - step, point + step)):
             with suppress(ParameterError):
                 sides[side] = self._terms(to)
-                width += COORDINATE_STEP
+                width += size
         (below, low), (above, high) = sides
         slopes = []
         for (N, D, scale), down, up, one in zip(here[0], below, above, self.responses, strict=True):
@@ -368,10 +371,10 @@ class Problem:
             dN = up.N * upper - down.N * lower
             dD = up.D * upper - down.D * lower
             slopes.append(one.over_deviation((dN - N / D * dD) / D))
-        return np.concatenate([*slopes, high - low]) / max(width, COORDINATE_STEP)
+        return np.concatenate([*slopes, high - low]) / max(width, size)
 
     def _terms(self, point: Real) -> tuple[list[Fraction], Real]:
-        """The responses, and what decays and priors leave."""
+        """Return the responses, and what decays and priors leave."""
         coordinates = zip(self.parameters, point.tolist(), strict=True)
         priors = [
             (each.value(x) - each.prior[0]) / each.prior[1]
@@ -381,7 +384,7 @@ class Problem:
         return self.fractions(point), np.r_[self.decays(point, self.rings), priors]
 
     def decays(self, point: Real, rings: Sequence[RingMode]) -> Real:
-        """What decays leave, over its deviation (n,), of logarithms of frequencies and of ratios."""
+        """Return the residuals of decays, over their deviations (n,), of logarithms of frequencies and of ratios."""
         rows: list[float] = []
         for each in rings:
             s = eigenvalue(self.arm(point), each.number)
@@ -392,7 +395,7 @@ class Problem:
 
 
 def penalize(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], Real]:
-    """The residuals, and where there is no arm (a mass beyond the tip) a wall, so high that no search goes on there."""
+    """Return the residuals with a wall where there is no arm (a mass beyond the tip), too high for a search."""
     near = residuals(first)
     wall = np.full(near.size, 10.0 * max(abs(near).max(initial=0.0), 1.0))
 

@@ -25,7 +25,8 @@ from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.digits import join_words
 from tfarm.errors import require
 from tfarm.fitting.data import CONFIDENCE
-from tfarm.fitting.solve import FIT_SEED, OPEN_DEVIATION, Fitted, Solution, nearest_minimum, principal_axes
+from tfarm.fitting.intervals import Fitted
+from tfarm.fitting.solve import FIT_SEED, OPEN_DEVIATION, Solution, nearest_minimum, principal_axes
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 
@@ -102,14 +103,16 @@ class Posterior(StrictTable):
         x_r = np.empty((len(known), len(normal)))
         for row, n in zip(x_r, known, strict=True):
             of = self.numbers[n]
-            p = np.asarray(ranged[of.key])
-            row[:] = (p - of.value) / of.size if of.size else np.log(np.maximum(p / of.value, LEAST_SIZE))
+            p = ranged[of.key]
+            if of.size:
+                row[:] = (p - of.value) / of.size
+            else:
+                row[:] = np.log(np.maximum(p / of.value, LEAST_SIZE))
         # unique: independent of the processor
         L = np.linalg.cholesky(P[np.ix_(rest, rest)])
         x_o = np.linalg.solve(L.T, normal.T - np.linalg.solve(L, P[np.ix_(rest, known)] @ x_r)).T
-        value, size = np.transpose([(self.numbers[n].value, self.numbers[n].size) for n in rest]).reshape(
-            2, -1
-        )
+        value = np.array([self.numbers[n].value for n in rest])
+        size = np.array([self.numbers[n].size for n in rest])
         return np.where(size > 0, value + size * x_o, value * np.exp(x_o))
 
 
@@ -201,7 +204,9 @@ class Repeats:
 
 
 def repeats(fit: Solution, fitted: Sequence[Fitted], draws: int = 40) -> Repeats | None:
-    """The scatter between the records of the response that there are most of; None where there are fewer than three.
+    """Return the scatter between the records of the response that there are most of.
+
+    None where there are fewer than three.
 
     Each least sum over some of the responses begins at that over all; sensors of the others are held, and so is what
     all together do not determine.
@@ -221,8 +226,9 @@ def repeats(fit: Solution, fitted: Sequence[Fitted], draws: int = 40) -> Repeats
 
     def numbers(chosen: Sequence[int]) -> Real:
         some = (*(records[n] for n in chosen), *others)
-        sensors = {place for each in some for place in (each.gain, each.delay)}
-        used = identified.keys() & {*sensors, *range(len(own.of_the_arm))}
+        gains = [each.gain for each in some]
+        delays = [each.delay for each in some]
+        used = identified.keys() & {*gains, *delays, *range(len(own.of_the_arm))}
         held = {n: float(x) for n, x in enumerate(fit.point) if n not in used}
         point = nearest_minimum(replace(own, responses=some), fit.point, held).point
         return np.array([own.value(point, n) for n in known])

@@ -44,7 +44,8 @@ from tfarm.arrays import Complex, Real
 from tfarm.case import Case
 from tfarm.dsp.results import simulate_modes
 from tfarm.dsp.scenarios import Scenario
-from tfarm.dsp.simulate import Simulation, Simulator
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.simulation import Simulation
 from tfarm.errors import MISSING, did_you_mean, list_within, must_be_known, name_file, require
 from tfarm.files import read_mat
 from tfarm.fitting.data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet
@@ -82,7 +83,7 @@ class Recording:
         return np.asarray(self.start + self.period * np.arange(self.count))
 
     def signal(self, name: str, key: str) -> Real:
-        """The signal of that name.  Raises ParameterError, naming `key`, with the nearest one there is."""
+        """Return the signal of that name.  Raises ParameterError, naming `key`, with the nearest one there is."""
         require(name in self.signals, key, name, did_you_mean(name, self.signals), self.source)
         return self.signals[name]
 
@@ -96,7 +97,7 @@ class Recording:
 
 
 def read_recording(path: str | os.PathLike[str]) -> Recording:
-    """The record of a CSV file with a column t [s], or of a .mat file with a vector t (or time).
+    """Return the record of a CSV file with a column t [s], or of a .mat file with a vector t (or time).
 
     A matrix of a .mat file with a row a sample is one signal a column: "X.1", "X.2", ...  Raises ParameterError, naming
     the file, where there are no times, no signals, or samples that are not even.
@@ -104,10 +105,10 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
     name = os.fspath(path)
     if name.lower().endswith(".mat"):
         found, data = read_mat(name, MOST_RECORD_BYTES, key="record")
-        numbers = {
-            each: value for each, value in found.items() if value.ndim == 2 and value.dtype.kind in "biuf"
-        }
-        held = {each: value.astype(float) for each, value in numbers.items()}
+        held = {}
+        for each, value in found.items():
+            if value.ndim == 2 and value.dtype.kind in "biuf":
+                held[each] = value.astype(float)
         units = dict.fromkeys(held, "")
         digest = hashlib.sha256(data).hexdigest()
     else:
@@ -121,13 +122,13 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
         remedy = f"a record has a column t, in seconds; this one has {list_within(held, 300) or 'none'}"
         require(of_times in columns, "t", MISSING, remedy)
         require(units[of_times] in ("", "s"), f"unit of {of_times}", units[of_times], "times are in seconds")
-        start, period, jitter = _timing(columns.pop(of_times))
+        start, period, jitter = even_timing(columns.pop(of_times))
         require(columns, "signals", MISSING, "a column of times and no other")
     return Recording(signals=columns, start=start, period=period, jitter=jitter, source=name, digest=digest)
 
 
 def _columns(held: dict[str, Real], size: int) -> dict[str, Real]:
-    """Vectors of that size and the columns of matrices that have as many rows."""
+    """Return vectors of that size and the columns of matrices that have as many rows."""
     columns: dict[str, Real] = {}
     for name, value in held.items():
         if max(value.shape) == value.size == size:
@@ -145,8 +146,8 @@ def _columns(held: dict[str, Real], size: int) -> dict[str, Real]:
     return columns
 
 
-def _timing(times: Real) -> tuple[float, float, float]:
-    """Start and period [s] of even samples, and the largest distance from them as a share of the period."""
+def even_timing(times: Real) -> tuple[float, float, float]:
+    """Return start and period [s] of even samples, and the largest distance from them as a share of the period."""
     require(
         times.size >= LEAST_SAMPLES, "samples", times.size, f"a record has {LEAST_SAMPLES} samples at least"
     )
@@ -190,7 +191,7 @@ class MeasuredRun:
     source: str = ""
 
     def scenario(self, period: float) -> Scenario:
-        """The same task at samples: from rest at the first reference, with the reference relative to that.
+        """Return the same task at samples: from rest at the first reference, with the reference relative to that.
 
         The reference is interpolated linearly between its rows.
         """
@@ -220,7 +221,7 @@ class RunComparison:
 
 
 def compare_run(case: Case, measured: MeasuredRun) -> RunComparison:
-    """The sampled loop under the reference of a measured run, with as many modes as its signals take.
+    """Return the sampled loop under the reference of a measured run, with as many modes as its signals take.
 
     Raises ParameterError as `simulate` does.
     """
@@ -246,14 +247,17 @@ def departures(
 
 
 def overshoot(angle: Real, step: float, end: float) -> float:
-    """The overshoot of an angle [rad] beyond the `end` of a step [rad], as a share of it; below 0 where it has none."""
+    """Return the overshoot of an angle [rad] beyond the `end` of a step [rad], as a share of it.
+
+    Below 0 where it has none.
+    """
     if step:
         return float(np.max((angle - end) * np.sign(step)) / abs(step))
     return 0.0
 
 
 def load_run(name_or_path: AnyFile) -> MeasuredRun | None:
-    """The run of a file's [measured] table, None where it has none.
+    """Return the run of a file's [measured] table, None where it has none.
 
     Raises ParameterError for an unknown key, and for a record without these signals or that is none, naming the file.
     """
@@ -348,7 +352,7 @@ def frequency_response(
     segment: float | None = None,
     overlap: float | None = None,
 ) -> Estimate:
-    """The response `output`/`input` of a record, from its signals of these names or of those in `columns`.
+    """Return the response `output`/`input` of a record, from its signals of these names or of those in `columns`.
 
     `segment` [s] is by default an eighth of the record, `overlap` half of it with a window that tapers, else none.
     Raises ParameterError for signals that are not there, for a segment that leaves no two of them, and for an input
@@ -363,10 +367,11 @@ def frequency_response(
     names = columns or (output, input)
     y = recording.signal(names[0], "--output")
     x = recording.signal(names[1], "--input")
-    overlap = 0.5 * (window == "hann") if overlap is None else overlap
-    size, step = _cut(recording, segment, overlap)
+    if overlap is None:
+        overlap = 0.5 * (window == "hann")
+    size, step = segment_size(recording, segment, overlap)
     how = {"window": window, "nperseg": size, "noverlap": size - step}
-    lines, values, coherence = _estimated(estimator, x, y, how)
+    lines, values, coherence = averaged_response(estimator, x, y, how)
     require(lines.size, "record", names[1], "does not move", recording.source)
     require(coherence.any(), "record", names[0], "does not move", recording.source)
     count = 1 + (recording.count - size) // step
@@ -394,18 +399,18 @@ def frequency_response(
     )
 
 
-def _estimated(
+def averaged_response(
     estimator: str, x: Real, y: Real, how: dict[str, Any]
 ) -> tuple[NDArray[np.intp], Complex, Real]:
-    """The lines that the input has power in, the response and the coherence there.
+    """Return the lines that the input has power in, the response and the coherence there.
 
     Without the line at 0 and the last one, at half the rate of sampling, which are real.
     """
     from scipy.signal import csd, welch
 
-    S_xx = welch(x, **how)[1]
-    S_xy = csd(x, y, **how)[1]
-    S_yy = welch(y, **how)[1]
+    _, S_xx = welch(x, **how)
+    _, S_xy = csd(x, y, **how)
+    _, S_yy = welch(y, **how)
     lines = np.arange(1, S_xx.size - 1)
     # of the largest line of the input: below it there are rounding errors alone
     lines = lines[S_xx[lines] > 1e-24 * S_xx.max()]
@@ -413,25 +418,26 @@ def _estimated(
     S_yy = S_yy[lines]
     cross = abs(S_xy[lines])
     with np.errstate(divide="ignore", invalid="ignore"):
-        sizes = {
-            "H1": cross / S_xx,
-            "H2": np.where(cross == 0, 0.0, S_yy / cross),
-            "Hv": np.sqrt(S_yy / S_xx),
-        }
+        if estimator == "H1":
+            size = cross / S_xx
+        elif estimator == "H2":
+            size = np.where(cross == 0, 0.0, S_yy / cross)
+        else:
+            size = np.sqrt(S_yy / S_xx)
         phase = np.where(cross == 0, 1.0, S_xy[lines] / cross)
         coherence = np.where(S_yy > 0, cross**2 / (S_xx * S_yy), 0.0)
-    return lines, sizes[estimator] * phase, np.clip(coherence, 0.0, 1.0)
+    return lines, size * phase, np.clip(coherence, 0.0, 1.0)
 
 
 def independent_averages(w: Real, step: int, count: int) -> float:
-    """The number of independent averages in a number of overlapped segments (Welch 1967)."""
+    """Return the number of independent averages in a number of overlapped segments (Welch 1967)."""
     j = np.arange(1, min(count, math.ceil(w.size / step)))
     rho = np.array([w[: w.size - lag] @ w[lag:] for lag in j * step]) / (w @ w)
     return float(count / (1 + 2 * (1 - j / count) @ rho**2))
 
 
-def _cut(recording: Recording, segment: float | None, overlap: float) -> tuple[int, int]:
-    """Samples of a segment, and from one to the next."""
+def segment_size(recording: Recording, segment: float | None, overlap: float) -> tuple[int, int]:
+    """Return samples of a segment, and from one to the next."""
     require(0 <= overlap < 1, "--overlap", overlap, "a share of a segment from 0 to below 1, such as 0.5")
     whole = recording.count * recording.period
     least = LEAST_SAMPLES * recording.period

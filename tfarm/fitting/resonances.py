@@ -26,9 +26,13 @@ from tfarm.moved import moved
 from tfarm.records import frozen
 from tfarm.response.frequency import HERTZ
 
-_DECAYS = "tfarm.fitting.decays"
 __getattr__ = moved(
-    __name__, {"DecayMode": _DECAYS, "Ring": f"{_DECAYS}:RingdownFit", "ring": f"{_DECAYS}:fit_ringdown"}
+    __name__,
+    {
+        "DecayMode": "tfarm.fitting.decays",
+        "Ring": "tfarm.fitting.decays:RingdownFit",
+        "ring": "tfarm.fitting.decays:fit_ringdown",
+    },
 )
 
 # of ln w: what a peak or a pole in the band costs without a partner; so partners are 1.8 apart at most
@@ -52,7 +56,7 @@ class Resonance:
 
 
 def peaks_of(data: Measured, sigma: Real) -> NDArray[np.intp]:
-    """The places (n,) of the peaks above the noise."""
+    """Return the places (n,) of the peaks above the noise."""
     from scipy.signal import find_peaks
 
     size = abs(data.values)
@@ -66,7 +70,7 @@ def peaks_of(data: Measured, sigma: Real) -> NDArray[np.intp]:
 def matched_peaks(
     measured: NDArray[Any], own: NDArray[Any], band: tuple[float, float]
 ) -> tuple[list[tuple[int, int]], float]:
-    """Pairs of places in two ascending rows of frequencies, in order, with the least cost, and that cost.
+    """Return pairs of places in two ascending rows of frequencies, in order, with the least cost, and that cost.
 
     The cost of a pair is |ln w/w'|; one of a row that is left alone costs UNPAIRED, but an own one outside of the band.
     Each has a partner of its own to be left alone with; of pairs that cross the same places in order cost no more.
@@ -85,7 +89,7 @@ def matched_peaks(
 
 
 def peaks_among(poles: Complex) -> Complex:
-    """Those poles (n,) [1/s] that make a peak, Im s > 0, by |s|."""
+    """Return those poles (n,) [1/s] that make a peak, Im s > 0, by |s|."""
     # a pole of a larger damping ratio is no peak
     upper = poles[(poles.imag > 0) & (-poles.real < 0.5 * abs(poles))]
     return upper[np.argsort(abs(upper))]
@@ -124,13 +128,13 @@ def must_be_in_unit(data: Measured, sigma: Real, poles: Complex) -> None:
 
 
 def project(columns: Real, y: Real) -> tuple[Real, Real]:
-    """The linear numbers of the least squares, and the residuals."""
+    """Return the linear numbers of the least squares, and the residuals."""
     linear = np.asarray(np.linalg.lstsq(columns, y, rcond=None)[0], dtype=float)
     return linear, y - columns @ linear
 
 
 def least_projected(columns: Callable[[Real], Real], y: Real, start: Real, **how: Any) -> Any:
-    """The numbers x, next to a start, for which columns(x) leave the least residuals of y."""
+    """Return the numbers x, next to a start, for which columns(x) leave the least residuals of y."""
     from scipy.optimize import least_squares
 
     def residuals(x: Real) -> Real:
@@ -140,8 +144,8 @@ def least_projected(columns: Callable[[Real], Real], y: Real, start: Real, **how
 
 
 def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
-    """The pole and residue of the peak at a place; None where its lines do not determine them."""
-    kept = _around(data, place)
+    """Return the pole and residue of the peak at a place; None where its lines do not determine them."""
+    kept = lines_of_peak(data, place)
     omega = data.omega[kept]
     sigma = sigma[kept]
     # the number of coefficients c
@@ -153,13 +157,13 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
     powers = (s / w) ** np.arange(background)[:, None]
 
     def columns(x: Real) -> Real:
-        """Those of Re r, Im r and the c."""
+        """Return those of Re r, Im r and the c."""
         up = 1 / (s + x[0] - 1j * x[1])
         down = 1 / (s + x[0] + 1j * x[1])
         return in_parts(np.r_["0,2", up + down, 1j * (up - down), powers] / sigma).T
 
     y = in_parts(data.values[kept] / sigma)
-    half = max(_half_width(data, place), np.ptp(omega) / (4 * omega.size))
+    half = max(half_width(data, place), np.ptp(omega) / (4 * omega.size))
     found = least_projected(columns, y, np.array([half, w]))
     sigma_p, w_p = found.x.tolist()
     if not found.success or not omega[0] < w_p < omega[-1] or abs(sigma_p) > w_p:
@@ -169,28 +173,27 @@ def resonance_at(data: Measured, sigma: Real, place: int) -> Resonance | None:
     return Resonance(pole=complex(-sigma_p, w_p), residue=complex(re, im), std=np.sqrt(np.diag(spread)))
 
 
-def _half_width(data: Measured, place: int) -> float:
-    """Half the width [rad/s] of a peak where it has lost 3 dB, to the nearer side."""
+def half_width(data: Measured, place: int) -> float:
+    """Return half the width [rad/s] of a peak where it has lost 3 dB, to the nearer side."""
     size = abs(data.values)
     away = abs(data.omega - data.omega[place])
     return float(away[size < size[place] / math.sqrt(2)].min(initial=np.ptp(data.omega)))
 
 
-def _around(data: Measured, place: int) -> slice:
-    """The lines from dip to dip around a peak, and no farther than some of its widths, but three to each side."""
+def lines_of_peak(data: Measured, place: int) -> slice:
+    """Return the lines from dip to dip around a peak, no farther than some of its widths, but three to each side."""
     size = abs(data.values)
     away = abs(data.omega - data.omega[place])
     # half-widths of a peak that its pole is fitted to: tuned with `resonance_at`'s background, for the least bias
-    reach = 3.0 * _half_width(data, place)
+    reach = 3.0 * half_width(data, place)
 
     def end(way: int) -> int:
         at = place
         lowest = size[place]
-        while (
-            0 <= at + way < size.size
-            and size[at + way] < 2 * lowest
-            and (away[at] < reach or abs(at - place) < 3)
-        ):
+        while 0 <= at + way < size.size and (away[at] < reach or abs(at - place) < 3):
+            # the flank of the next peak
+            if size[at + way] >= 2 * lowest:
+                break
             at += way
             lowest = min(lowest, size[at])
         return at

@@ -30,19 +30,15 @@ from tfarm.exact.outputs import OUTPUTS, Output
 from tfarm.exact.series import constant_of, without_slow_pole
 from tfarm.exact.system import System
 from tfarm.exact.values import evaluate_outputs, free_slopes
-from tfarm.reduced.partial_fractions import PartialFractions
+from tfarm.reduced.partial_fractions import PartialFractions, sum_at_rest
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.response.signals import Signals
 from tfarm.spectrum import Modes, modes
 from tfarm.spectrum.damped import damped_modes, missing_real_eigenvalues
 from tfarm.spectrum.naming import single_zeros
 
-# c_j C, and below s C of the fit: tuned by hand on the lab arm
-CORNER_RATIOS = 1 + np.geomspace(0.02, 30.0, 14)
-# the corners, two a pair
-SLOW_PAIRS = CORNER_RATIOS.size // 2
-# s C at which they are fitted: tuned with CORNER_RATIOS
-FITTED_AT = np.geomspace(0.02, 5.0, 60)
+# slow real poles in the place of all omitted modes, two a pair
+SLOW_PAIRS = 7
 # C w of the last mode, at least: below, the omitted modes are not overdamped
 SLOW_POLES_FROM = 1.2
 
@@ -52,18 +48,14 @@ def slow_remainder(C: float, missing: Callable[[Complex], Complex]) -> tuple[Rea
 
     `missing` is the remainder of the modal sum of each output (outputs, n) at s (n,).
     """
-    basis = 1 / (1 + FITTED_AT[:, None] / CORNER_RATIOS) - 1
-    left = missing((FITTED_AT / C).astype(complex)).real
+    # c_j C, and s C at which they are fitted: tuned by hand on the lab arm
+    corners = 1 + np.geomspace(0.02, 30.0, 2 * SLOW_PAIRS)
+    at = np.geomspace(0.02, 5.0, 60)
+    basis = 1 / (1 + at[:, None] / corners) - 1
+    left = missing((at / C).astype(complex)).real
     # 1e-12 of the largest singular value
     shares: Real = np.linalg.lstsq(basis, left.T, rcond=1e-12)[0].T.astype(float)
-    return CORNER_RATIOS / C, shares
-
-
-AT_HUB = (  # moment and shear force of the link at the hub, and the hub's angle
-    Output(quantity="M", place="root", label="moment at the root"),
-    OUTPUTS["root_shear"],
-    OUTPUTS["hub_angle"],
-)
+    return corners / C, shares
 
 
 def powers_of(wanted: Sequence[Output]) -> NDArray[np.int64]:
@@ -78,12 +70,13 @@ def end_residues(
 
     There A theta = B M on the hub (see `tfarm.exact.system`); the one with the larger factor has lost digits.
     """
+    root_moment = Output(quantity="M", place="root", label="moment at the root")
+    at_hub = (root_moment, OUTPUTS["root_shear"], OUTPUTS["hub_angle"])
     with np.errstate(all="ignore"):
-        here, slopes = free_slopes(k, [*wanted, *AT_HUB], p, x)
-        residues: Complex = here.outputs[: len(wanted)] / slopes.drive
-        moment, shear, theta = (
-            row / float(unit_scale(each, k)) for row, each in zip(here.outputs[-3:], AT_HUB, strict=True)
-        )
+        here, slopes = free_slopes(k, [*wanted, *at_hub], p, x)
+        residues: Complex = here.outputs[:-3] / slopes.drive
+        units = np.array([float(unit_scale(each, k)) for each in at_hub])
+        moment, shear, theta = here.outputs[-3:] / units[:, None]
         A, B = k.drive.at(p)
         heavy = abs(A) > abs(B)
         balanced = {
@@ -91,8 +84,9 @@ def end_residues(
             "M": np.where(heavy | (B == 0), moment, theta * A / B),
         }
         for row, each in enumerate(wanted):
-            at_root = each.share(x) == 0 and (each.place == "x" or not each.gauge or k.gauge.share == 0)
-            if each.quantity == "theta" or (each.quantity == "M" and at_root and k.reads_hub_moment):
+            is_at_place = each.place == "x" or not each.gauge or k.gauge.share == 0
+            is_at_hub = each.share(x) == 0 and is_at_place and k.reads_hub_moment
+            if each.quantity == "theta" or (each.quantity == "M" and is_at_hub):
                 damper = (1.0 + k.segments[-1].damping * p) ** each.gauge
                 value = balanced[each.quantity] * float(unit_scale(each, k)) * p**each.power
                 residues[row] = value / (slopes.drive * damper)
@@ -110,7 +104,8 @@ def contour_residues(k: System, wanted: Sequence[Output], p: Complex, known: Com
     _must_be_apart(p[radius < 1e-9 * abs(p)])
     # a pole 4 radii away adds 4^-32 of its residue
     arrow = np.outer(radius, np.exp(2j * np.pi * np.arange(32) / 32))
-    values = evaluate_outputs(k, wanted, (p[:, None] + arrow).ravel(), x).reshape(len(wanted), *arrow.shape)
+    circle = (p[:, None] + arrow).ravel()
+    values = evaluate_outputs(k, wanted, circle, x).reshape(-1, *arrow.shape)
     return np.asarray((values * arrow).mean(axis=-1))
 
 
@@ -159,7 +154,13 @@ def modal_model(
         index = index[:0]
         p = p[:0]
         r = r[:, :0]
-    expansion, kept = _at_rest(G, single, table)
+    residues = r[:-1]
+    # of the output at the hub
+    of_input = r[-1]
+    single_residues = alone[:-1]
+    expansion, kept = _expansion(G, single, table)
+    of_pairs = sum_at_rest(residues, p)
+    of_single = (single_residues / single)[:, kept].sum(axis=1)
     return ModalModel(
         arm=arm,
         rows=G.rows,
@@ -167,12 +168,12 @@ def modal_model(
         index=index,
         natural_frequency=np.where(index > 0, table.flexible[index - 1], abs(p[:, 0])),
         eigenvalues=p,
-        residues=r[:-1],
+        residues=residues,
         rigid=expansion[:, :2],
-        static=expansion[:, 2] + (r[:-1] / p).real.sum(axis=(1, 2)) + (alone / single)[:-1, kept].sum(axis=1),
+        static=expansion[:, 2] + of_pairs + of_single,
         single=single,
-        single_residues=alone[:-1],
-        participation=np.sqrt(abs((r[-1] * p[:, ::-1]).real.sum(axis=-1))),
+        single_residues=single_residues,
+        participation=np.sqrt(abs((of_input * p[:, ::-1]).real.sum(axis=-1))),
     )
 
 
@@ -185,8 +186,8 @@ def relaxed_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None)
     C = arm.damping
     require(C, "link.damping", C, "without damping nothing relaxes; take modal_model")
     model = modal_model(arm, outputs, count, x)
-    exact, kept = _at_rest(transfer(arm, model.rows, x=x), model.single, modes(arm, 1))
-    slope = exact[:, 3] + (model.residues / model.eigenvalues**2).real.sum(axis=(1, 2))
+    exact, kept = _expansion(transfer(arm, model.rows, x=x), model.single, modes(arm, 1))
+    slope = exact[:, 3] + sum_at_rest(model.residues, model.eigenvalues**2)
     slope += (model.single_residues / model.single**2)[:, kept].sum(axis=1)
     return replace(
         model,
@@ -207,22 +208,22 @@ def slow_model(arm: Arm, outputs: Wanted, count: int, x: float | None = None) ->
     model = modal_model(arm, outputs, count, x)
     exact = transfer(arm, outputs, x=x)
     corners, shares = slow_remainder(C, lambda s: exact(s).reshape(-1, s.size) - model(s))
-    residues = (shares * corners).reshape(len(shares), -1, 2)
-    return model.with_pairs(
-        -corners.reshape(-1, 2), residues, model.static - shares.sum(axis=1), np.zeros(SLOW_PAIRS)
-    )
+    residues = (shares * corners).reshape(-1, SLOW_PAIRS, 2)
+    static = model.static - shares.sum(axis=1)
+    return model.with_pairs(-corners.reshape(-1, 2), residues, static, np.zeros(SLOW_PAIRS))
 
 
-def _at_rest(G: TransferFunction, single: Real, table: Modes) -> tuple[Real, NDArray[np.bool_]]:
+def _expansion(G: TransferFunction, single: Real, table: Modes) -> tuple[Real, NDArray[np.bool_]]:
     """Return the expansion at s = 0 (outputs, 4), and which single poles (m,) still have to be subtracted from it.
 
     The slow pole of a hub with hardly any friction is left out of the coefficients of 1 and s.
     """
-    slowest = abs(single).min(initial=math.inf)
+    distances = abs(single)
+    slowest = distances.min(initial=math.inf)
     # of the first frequency: a pole nearer to 0 leaves 1e-15 of itself five terms on
     if G.arm.has_rigid_mode and slowest < 1e-3 * table.flexible[0]:
         expansion = np.c_[G.expansion[:, :2], without_slow_pole(G.system, G.rows, G.share)]
-        return expansion, abs(single) > slowest
+        return expansion, distances > slowest
     return G.expansion, np.ones(single.size, np.bool_)
 
 
@@ -233,26 +234,31 @@ def _eigenvalues(arm: Arm, table: Modes, reach: float) -> tuple[NDArray[np.int64
     if arm.is_undamped:
         return index, 1j * np.outer(table.flexible, [1, -1]), np.array(single_zeros(table))
     # a large model has no need of all names: a limit of time alone
-    damped = damped_modes(table, steps=1_000 if len(table) > 40 else math.inf, reach=reach)
+    steps = 1_000 if len(table) > 40 else math.inf
+    damped = damped_modes(table, steps=steps, reach=reach)
     pairs = damped.eigenvalues[flexible]
-    more = damped.unassigned_pairs
-    whole = np.isfinite(pairs).all(axis=1)
-    rings = more[:, 0].imag > 0
-    halves = pairs[~whole & np.isfinite(pairs[:, 0]), 0].real
-    single = np.r_[damped.single, halves, more[~rings, 0].real, missing_real_eigenvalues(damped)]
-    return np.r_[index[whole], np.zeros(rings.sum(), np.int64)], np.r_[pairs[whole], more[rings]], single
+    is_known = np.isfinite(pairs)
+    is_pair = is_known.all(axis=1)
+    halves = pairs[~is_pair & is_known[:, 0], 0].real
+    others = damped.unassigned_pairs
+    rings = others[:, 0].imag > 0
+    unassigned = others[rings]
+    single = np.r_[damped.single, halves, others[~rings, 0].real, missing_real_eigenvalues(damped)]
+    numbers = np.r_[index[is_pair], np.zeros(len(unassigned), np.int64)]
+    return numbers, np.r_[pairs[is_pair], unassigned], single
 
 
 def _residues(
     table: Modes, k: System, wanted: list[Output], share: float, p: Complex, single: Real
 ) -> tuple[Complex, Real]:
     """Return residues (outputs, n, 2) at pairs of eigenvalues (n, 2), and at single real ones (outputs, m)."""
-    rings = p[:, 0].imag > 0
-    s = np.r_[p[:, 0], p[~rings, 1], single]
+    first = p[:, 0]
+    is_real = first.imag <= 0
+    s = np.r_[first, p[is_real, 1], single]
     found, doubtful = end_residues(k, wanted, s, share)
     if table.arm.is_undamped:
         close = np.diff(table.flexible) < 1e-8 * table.flexible[1:]
-        _must_be_apart(p[1:, 0][close])
+        _must_be_apart(first[1:][close])
         # the pole of the circuit, where the current is 0 over 0
         doubtful[len(p) :] = True
     if doubtful.any():
@@ -263,7 +269,7 @@ def _residues(
         found = (found * 2 * s / power).real * power / (2 * s)
     upper, others, alone = np.split(found, [len(p), s.size - single.size], axis=1)
     residues = np.stack([upper, upper.conj()], axis=2)
-    residues[:, ~rings] = np.stack([upper[:, ~rings], others], axis=2).real
+    residues[:, is_real] = np.stack([upper[:, is_real], others], axis=2).real
     return residues, alone.real.astype(float)
 
 
@@ -284,11 +290,13 @@ def sensed_model(arm: Arm, signals: Sequence[str], count: int) -> Matrices:
     for share in dict.fromkeys(read.places):
         mine = [n for n, place in enumerate(read.places) if place == share]
         wanted = [*extra, *(read.outputs[n] for n in mine)]
-        x = share * arm.length if any(each.place == "x" for each in wanted) else None
+        x = None
+        if any(each.place == "x" for each in wanted):
+            x = share * arm.length
         A, B, C, D = modal_model(arm, wanted, count, x).matrices()
         both |= zip(mine, np.c_[C, D][len(extra) :], strict=True)
-    C, D = np.split(np.array([both[n] for n in sorted(both)]), [-1], axis=1)
-    return A, B, C, D
+    rows = np.array([both[n] for n in sorted(both)])
+    return A, B, rows[:, :-1], rows[:, -1:]
 
 
 def closed_loop_matrix(plant: Matrices, law: Matrices) -> Real:

@@ -2,8 +2,7 @@
 
 The error is the largest |dG| / (|G| + |w G'|) over a frequency range.  The norm is finite at zeros and poles of G.  The
 error varies on the scale of the exact poles, of the zeros of G and G', and of the poles of the model.  The samples are
-dense there, and each high local maximum is refined.  The printed error has a margin of 2 % (`FOUND_TO_WORST`, tuned on
-random arms).
+dense there, and each high local maximum is refined.  The printed error has a margin of 2 %, tuned on random arms.
 """
 
 from __future__ import annotations
@@ -64,7 +63,9 @@ class PartialFractions:
     @property
     def rigid_states(self) -> int:
         """The number of states of the rigid body: angle and rate where an output has it, with friction one of them."""
-        return bool(self.rigid.any()) * (1 if self.arm.rate_loss else 2)
+        if not self.rigid.any():
+            return 0
+        return 1 if self.arm.rate_loss else 2
 
     @property
     def order(self) -> int:
@@ -74,17 +75,23 @@ class PartialFractions:
     @property
     def states(self) -> tuple[str, ...]:
         """Names of the states, in the order of `matrices`."""
-        rigid = ("rigid_angle", "rigid_rate")[2 - self.rigid_states :]
+        names = ["rigid_angle", "rigid_rate"][2 - self.rigid_states :]
         tails = np.cumsum(self.index == 0)
-        names = [f"mode{k}" if k else f"tail{n}" for k, n in zip(self.index, tails, strict=True)]
-        pairs = tuple(f"{name}_{part}" for name in names for part in ("position", "rate"))
-        alone = tuple(f"single{i}" for i in range(1, self.single.size + 1 - self.relaxes))
-        return rigid + pairs + alone + ("relaxation",) * self.relaxes
+        for k, n in zip(self.index, tails, strict=True):
+            pair = f"mode{k}" if k else f"tail{n}"
+            names += [f"{pair}_position", f"{pair}_rate"]
+        alone = self.single.size - self.relaxes
+        names += [f"single{i + 1}" for i in range(alone)]
+        if self.relaxes:
+            names.append("relaxation")
+        return tuple(names)
 
     @property
     def input(self) -> str:
         """The input of the arm, "hub_angle" [rad] where the hub is locked."""
-        return "hub_angle" if self.arm.is_locked else self.arm.input
+        if self.arm.is_locked:
+            return "hub_angle"
+        return self.arm.input
 
     @property
     def numerators(self) -> tuple[Real, Real]:
@@ -136,7 +143,8 @@ class PartialFractions:
             alone[-1] = -self.single[-1]
         J = self.arm.total_inertia
         A = block_diag(np.eye(first, k=1), *pairs, np.diag(self.single))
-        B = np.r_[np.zeros(first)[1:], np.ones(first)[:1] / J, np.c_[0 * b, b].ravel(), alone]
+        torque = np.array([0.0, 1 / J])[2 - first :]
+        B = np.r_[torque, np.c_[0 * b, b].ravel(), alone]
         of_pairs = np.stack([n0 / (w * b), n1 / b], axis=-1).reshape(len(n0), -1)
         C = np.hstack([self.rigid[:, 2 - first :] * J, of_pairs, self.single_residues / alone])
         return A, B[:, None], C, self.static[:, None].copy()
@@ -144,9 +152,8 @@ class PartialFractions:
     def first(self, count: int) -> PartialFractions:
         """Return the model with the first `count` of the arm's modes, the static gains of the others in `static`."""
         beyond = self.index > count
-        beyond |= (self.index == 0) & (
-            self.natural_frequency > self.natural_frequency[beyond].min(initial=np.inf)
-        )
+        first_omitted = self.natural_frequency[beyond].min(initial=np.inf)
+        beyond |= (self.index == 0) & (self.natural_frequency > first_omitted)
         kept = ~beyond
         return replace(
             self,
@@ -154,7 +161,7 @@ class PartialFractions:
             natural_frequency=self.natural_frequency[kept],
             eigenvalues=self.eigenvalues[kept],
             residues=self.residues[:, kept],
-            static=self.static - (self.residues[:, beyond] / self.eigenvalues[beyond]).real.sum(axis=(1, 2)),
+            static=self.static - sum_at_rest(self.residues[:, beyond], self.eigenvalues[beyond]),
             participation=self.participation[kept],
         )
 
@@ -177,7 +184,8 @@ class PartialFractions:
         A, B, C, D = self.matrices()
         row = np.atleast_2d(np.asarray(gains, dtype=float))
         share = 1 / (1 + row @ D)
-        return A - B @ (share * row @ C), B * share, C - D @ (share * row @ C), D * share
+        fed = share * row @ C
+        return A - B @ fed, B * share, C - D @ fed, D * share
 
     def state_space(self, name: str | None = None) -> control.StateSpace:
         """Return the model as a `control.StateSpace` with named inputs, outputs and states."""
@@ -192,12 +200,13 @@ class PartialFractions:
         )
 
 
-# times the largest error found: tuned on random arms
-FOUND_TO_WORST = 1.02
 # error of the exact values in the same norm
 EXACT_ROUNDING = 1e-14
-# of a frequency: the least distance of a sample from a pole
-CLEAR_OF_POLES = 1e-12
+
+
+def sum_at_rest(residues: Complex, p: Complex) -> Real:
+    """Return the sums of residues/p (outputs,) of pairs of poles p (n, 2), those at s = 0 with the other sign."""
+    return np.asarray((residues / p).real.sum(axis=(1, 2)))
 
 
 class Ruler:
@@ -207,9 +216,11 @@ class Ruler:
         self.G = transfer(arm, transfer(arm, outputs, x=x).rows, x=x)
         self.band = band
         self._poles = frequencies_around(arm, band[1])
-        w = self._clear(_samples(*band, self._poles))
+        w = _samples(*band, self._poles)
+        w = w[is_clear_of(w, self._poles)]
         for _ in range(2):
-            w = self._clear(np.union1d(w, self._dips(w)))
+            w = np.union1d(w, self._dips(w))
+            w = w[is_clear_of(w, self._poles)]
         self.w = w
         self._exact = values_and_norm(self.G, w)
 
@@ -221,6 +232,8 @@ class Ruler:
         """Return the largest error of each output, with a margin, and its frequency [rad/s]; high peaks are refined."""
         # of a peak of the error: a refinement is to an eighth of its width
         refined_points = 17
+        # times the largest error found: tuned on random arms
+        margin = 1.02
         errors = _errors(model, self.w, *self._exact)
         worst = errors.max(axis=1)
         at = self.w[errors.argmax(axis=1)]
@@ -229,54 +242,57 @@ class Ruler:
             for _ in range(3):
                 inner = np.linspace(low, high, refined_points)
                 found = np.zeros(inner.shape)
-                clear = self._is_clear(inner)
-                found[clear] = _errors(model, inner[clear], *values_and_norm(self.G, inner[clear]))[row]
+                clear = is_clear_of(inner, self._poles)
+                points = inner[clear]
+                found[clear] = _errors(model, points, *values_and_norm(self.G, points))[row]
                 best = np.unravel_index(found.argmax(), found.shape)
                 if found[best] > worst[row]:
                     worst[row] = found[best]
                     at[row] = inner[best]
-                around = np.clip(np.add(found.argmax(axis=0), [[-1], [1]]), 0, refined_points - 1)
+                around = _neighbours(found.argmax(axis=0), refined_points)
                 low, high = np.take_along_axis(inner, around, axis=0)
-        return worst * FOUND_TO_WORST + EXACT_ROUNDING, at
+        return worst * margin + EXACT_ROUNDING, at
 
     def _brackets(self, error: Real) -> tuple[Real, Real]:
         """Return the samples on either side of each high local maximum."""
         padded = np.r_[-1.0, error, -1.0]
+        is_peak = (error >= padded[:-2]) & (error >= padded[2:])
         # 0.2 of the highest: lower ones are not refined
-        (peaks,) = np.nonzero((error >= padded[:-2]) & (error >= padded[2:]) & (error >= 0.2 * error.max()))
+        peaks = np.flatnonzero(is_peak & (error >= 0.2 * error.max()))
         # 12: local maxima of the error that are refined, the highest first
         peaks = peaks[np.argsort(-error[peaks])][:12]
-        low, high = np.clip(np.add(peaks, [[-1], [1]]), 0, self.w.size - 1)
-        return self.w[low], self.w[high]
+        low, high = self.w[_neighbours(peaks, self.w.size)]
+        return low, high
 
     def _dips(self, w: Real) -> Real:
         """Return points around the dips of |G| and |G'|, where the norm is small."""
-        dips = [
-            np.flatnonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:])) + 1
-            for size in abs(np.concatenate([self.G(1j * w), self.G.derivative(1j * w)]))
-        ]
-        where = np.unique(np.concatenate(dips))
+        s = 1j * w
+        sizes = abs(np.concatenate([self.G(s), self.G.derivative(s)]))
+        inner = sizes[:, 1:-1]
+        is_dip = (inner < sizes[:, :-2]) & (inner < sizes[:, 2:])
+        where = np.flatnonzero(is_dip.any(axis=0)) + 1
         # 8: around each dip of |G| or |G'|
         return np.linspace(w[where - 1], w[where + 1], 8).ravel()
 
-    def _is_clear(self, w: Real) -> NDArray[np.bool_]:
-        return distance(w, self._poles) > CLEAR_OF_POLES * w
 
-    def _clear(self, w: Real) -> Real:
-        return w[self._is_clear(w)]
+def _neighbours(index: NDArray[np.int64], size: int) -> NDArray[np.int64]:
+    """Return the indices (2, n) on either side of each (n,), within an array of that size."""
+    return np.clip([index - 1, index + 1], 0, size - 1)
 
 
 def values_and_norm(G: TransferFunction, w: Real) -> tuple[Complex, Real]:
     """Return G(i w) and |G| + |w dG/dw| (outputs, w)."""
-    values = G(1j * w)
-    return values, abs(values) + abs(w * np.atleast_2d(G.derivative(1j * w)))
+    s = 1j * w
+    values = G(s)
+    return values, abs(values) + abs(w * np.atleast_2d(G.derivative(s)))
 
 
-def distance(w: Real, poles: Real) -> Real:
-    """Return the distance of each w from the nearest of the poles (ascending)."""
+def is_clear_of(w: Real, poles: Real, share: float = 1e-12) -> NDArray[np.bool_]:
+    """Return where a frequency is farther than that share of itself from the nearest of the poles (ascending)."""
     edged = np.r_[-np.inf, poles, np.inf]
     above = np.searchsorted(poles, w)
-    return np.minimum(w - edged[above], edged[above + 1] - w)
+    distance = np.minimum(w - edged[above], edged[above + 1] - w)
+    return np.asarray(distance > share * w)
 
 
 def frequencies_around(arm: Arm, high: float) -> Real:
@@ -290,7 +306,7 @@ def _samples(low: float, high: float, poles: Real) -> Real:
     count = 200 + int(60 * np.log10(high / low))
     # of samples from a pole, as shares of its frequency
     distances = 10.0 ** -np.arange(1, 8)
-    crowd = np.outer(poles, [*(1 - distances), *(1 + distances)]).ravel()
+    crowd = np.outer(poles, 1 + np.r_[-distances, distances]).ravel()
     # 24 between two poles
     knots = np.r_[low, poles[(poles > low) & (poles < high)], high]
     share = (1 - np.cos(np.linspace(0, np.pi, 26)[1:-1])) / 2
@@ -302,5 +318,6 @@ def _samples(low: float, high: float, poles: Real) -> Real:
 def _errors(model: PartialFractions, w: Real, exact: Complex, size: Real) -> Real:
     """Return |dG| and the rounding of a state space, over the norm; 0 for an output that is zero throughout."""
     # the terms of a model cancel where G is small: four roundings in their sum
-    gap = abs(model(1j * w) - exact) + 4 * MACHINE_EPS * model.magnitude(1j * w)
+    s = 1j * w
+    gap = abs(model(s) - exact) + 4 * MACHINE_EPS * model.magnitude(s)
     return np.divide(gap, size, out=np.where(gap > 0, np.inf, 0.0), where=size > 0)

@@ -21,7 +21,13 @@ from tfarm.arrays import Real
 from tfarm.errors import require
 from tfarm.exact.series import expansion_at_zero
 from tfarm.reduced.modal import MOST_MODELLED, modal_model, powers_of
-from tfarm.reduced.partial_fractions import PartialFractions, distance, frequencies_around, values_and_norm
+from tfarm.reduced.partial_fractions import (
+    PartialFractions,
+    frequencies_around,
+    is_clear_of,
+    sum_at_rest,
+    values_and_norm,
+)
 from tfarm.response import TransferFunction, Wanted, transfer
 from tfarm.spectrum import modes_below
 
@@ -78,12 +84,13 @@ def rational_model(
         inside = modal_model(arm, G.rows, exact, x)
         rest = _remainders(G, inside, high, frequencies)
         poles, shares, error = _best_poles(rest, pairs - exact)
+        found = exact + poles.size
         # 5e-14: errors below this are equal
-        rank = max(error, 5e-14), -exact - poles.size
+        rank = max(error, 5e-14), -found
         if rank < best:
             best = rank
-            model = _assembled(inside, rest, poles, shares)
-        if exact + poles.size == pairs:
+            model = _join_models(inside, rest, poles, shares)
+        if found == pairs:
             break
         exact = pairs - poles.size
     return model
@@ -94,12 +101,12 @@ def _remainders(G: TransferFunction, inside: PartialFractions, high: float, freq
     # denser towards the end of the range, where poles above have most effect; below 1 % of it S = 0 is enough
     w = high * np.sin(np.linspace(0.01, np.pi / 2, 300))
     # none next to a pole of the arm
-    w = w[distance(w, frequencies) > 1e-9 * w]
+    w = w[is_clear_of(w, frequencies, 1e-9)]
     S = -(w**2)
     power = powers_of(G.rows)
     bases = [each.base for each in G.rows]
     at_zero = np.array([expansion_at_zero(G.system, base, G.share) for base in bases])
-    by_S = ((at_zero[:, 0] != 0) | (power[:, 0] > 0))[:, None]
+    by_S = (at_zero[:, :1] != 0) | (power > 0)
     square = inside.natural_frequency**2
     p = inside.eigenvalues[:, 0]
     # of each output over its power of s, in the variable S
@@ -107,17 +114,20 @@ def _remainders(G: TransferFunction, inside: PartialFractions, high: float, freq
     values, size = values_and_norm(G, w)
     base = (values / (1j * w) ** power).real
     shared = 1 / (S + square[:, None])
-    F = np.where(
-        by_S, base * S - at_zero[:, :1] - (r @ shared) * S, base - at_zero[:, 2:3] + (r / square @ shared) * S
-    )
-    weight = np.divide(w**power, size, out=np.zeros_like(size), where=size > 0) / np.where(by_S, abs(S), 1.0)
-    kinds = [(each.quantity, each.place, kind) for each, kind in zip(bases, by_S[:, 0], strict=True)]
+    # of an output times S, and of another
+    of_S = base * S - at_zero[:, :1] - (r @ shared) * S
+    of_1 = base - at_zero[:, 2:3] + (r / square @ shared) * S
+    F = np.where(by_S, of_S, of_1)
+    unit = np.divide(w**power, size, out=np.zeros_like(size), where=size > 0)
+    weight = unit / np.where(by_S, abs(S), 1.0)
+    kinds = [(each.quantity, each.place, kind) for each, kind in zip(bases, by_S.ravel(), strict=True)]
     # one fit for powers of s of one quantity: the rate stays that of the angle
     for kind in set(kinds):
         same = [row for row, other in enumerate(kinds) if other == kind]
-        F[same], weight[same] = F[same[0]], weight[same].max(axis=0)
+        F[same] = F[same[0]]
+        weight[same] = weight[same].max(axis=0)
     beyond = max(high, inside.natural_frequency.max(initial=0.0))
-    return _Remainders(S, F, weight, by_S[:, 0], beyond)
+    return _Remainders(S, F, weight, by_S.ravel(), beyond)
 
 
 def _best_poles(rest: _Remainders, most: int) -> tuple[Real, Real, float]:
@@ -129,7 +139,7 @@ def _best_poles(rest: _Remainders, most: int) -> tuple[Real, Real, float]:
     least = float((abs(rest.F) * rest.weight).max())
     idle = 0
     for square in aaa_poles(rest.S, rest.F, rest.weight, most):
-        square, shares, error = _checked(rest, square[square > rest.beyond**2])
+        square, shares, error = _fit_shares(rest, square[square > rest.beyond**2])
         idle += 1
         if error < least:
             best = (np.sqrt(square), shares)
@@ -141,7 +151,7 @@ def _best_poles(rest: _Remainders, most: int) -> tuple[Real, Real, float]:
     return *best, least
 
 
-def _checked(rest: _Remainders, square: Real) -> tuple[Real, Real, float]:
+def _fit_shares(rest: _Remainders, square: Real) -> tuple[Real, Real, float]:
     """Return the poles with the right sign of their residue in the hub's output, their shares, and the error.
 
     Shares (outputs, poles) are those of weighted least squares for each output.
@@ -157,7 +167,8 @@ def _checked(rest: _Remainders, square: Real) -> tuple[Real, Real, float]:
             shares[row] = np.linalg.lstsq(columns / size, F * weight)[0] / size
         wrong = np.flatnonzero(sign * shares[0] < 0)
         if not wrong.size:
-            return square, shares, float((abs(shares @ basis.T - rest.F) * rest.weight).max())
+            errors = abs(shares @ basis.T - rest.F) * rest.weight
+            return square, shares, float(errors.max())
         square = np.delete(square, wrong[-1])
 
 
@@ -175,13 +186,16 @@ def aaa_poles(S: Real, F: Real, weight: Real, degree: int) -> Iterator[Real]:
     for _ in range(degree):
         support.append(int(error.max(axis=0).argmax()))
         others = np.setdiff1d(np.arange(S.size), support)
+        F_others = F[:, others]
+        F_support = F[:, support]
+        weight_others = weight[:, others]
         cauchy = 1 / (S[others, None] - S[support])
-        loewner = (F[:, others, None] - F[:, None, support]) * cauchy * weight[:, others, None]
+        loewner = (F_others[..., None] - F_support[:, None]) * cauchy * weight_others[..., None]
         (triangle,) = scipy.linalg.qr(loewner.reshape(-1, len(support)), mode="r")
         w = scipy.linalg.svd(triangle[: len(support)])[2][-1]
-        fit = ((w * F[:, support]) @ cauchy.T) / (cauchy @ w)
+        fit = ((w * F_support) @ cauchy.T) / (cauchy @ w)
         error = np.zeros_like(F)
-        error[:, others] = abs(fit - F[:, others]) * weight[:, others]
+        error[:, others] = abs(fit - F_others) * weight_others
         # its finite eigenvalues are the zeros of sum w_j/(S - S_j)
         arrow = np.diag(np.r_[0.0, S[support]])
         arrow[0, 1:] = w
@@ -192,10 +206,11 @@ def aaa_poles(S: Real, F: Real, weight: Real, degree: int) -> Iterator[Real]:
         finite = abs(denominator) > 1e-13 * abs(numerator)
         poles = -numerator[finite] / denominator[finite] * unit
         # 1e-10: relative; a pole whose imaginary part is below it is real
-        yield np.sort(poles.real[(abs(poles.imag) <= 1e-10 * abs(poles)) & (poles.real > 0)])
+        is_real = abs(poles.imag) <= 1e-10 * abs(poles)
+        yield np.sort(poles.real[is_real & (poles.real > 0)])
 
 
-def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares: Real) -> PartialFractions:
+def _join_models(inside: PartialFractions, rest: _Remainders, poles: Real, shares: Real) -> PartialFractions:
     """Return the exact modes and the poles above them as one model, without the hub's own output."""
     power = powers_of(inside.rows)
     s = 1j * poles
@@ -203,11 +218,9 @@ def _assembled(inside: PartialFractions, rest: _Remainders, poles: Real, shares:
     upper = in_S * s**power / (2 * s)
     added = np.stack([upper, upper.conj()], axis=2)
     ends = np.stack([s, s.conj()], axis=1)
-    static = inside.static + (added / ends).real.sum(axis=(1, 2))
+    static = inside.static + sum_at_rest(added, ends)
     # the poles above replace the static remainder
-    strict = rest.by_S & (power[:, 0] < 2)
+    strict = rest.by_S & (power.ravel() < 2)
     model = inside.with_pairs(ends, added, np.where(strict, 0.0, static), np.sqrt(abs(in_S[0])))
-    own = {
-        name: getattr(model, name)[1:] for name in ("rows", "residues", "rigid", "static", "single_residues")
-    }
-    return replace(model, **own)
+    of_outputs = ("rows", "residues", "rigid", "static", "single_residues")
+    return replace(model, **{name: getattr(model, name)[1:] for name in of_outputs})

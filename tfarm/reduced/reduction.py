@@ -6,7 +6,6 @@ The norm of an error is |dG| / (|G| + |w G'|).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -38,8 +37,6 @@ BAND = (0.1, 1000.0)
 NORM = "|dG| / (|G| + |w dG/dw|)"
 # of a model within an error
 MOST_STATES = 400
-# pairs of poles above the range: more would fit rounding
-MOST_TAILS = 12
 
 
 class Channel(NamedTuple):
@@ -208,7 +205,7 @@ def reduce(
     error = positive("error", error, "a positive number, such as 1e-6")
     remedy = f"below the rounding of the exact values; give {EXACT_ROUNDING:g} or more"
     require(error >= EXACT_ROUNDING, "error", error, remedy)
-    return _Bench(arm, rows, band, x, method).within(error)
+    return _Bench(arm, rows, band, x, method).smallest_within(error)
 
 
 class _Bench:
@@ -222,11 +219,16 @@ class _Bench:
         x: float | None,
         method: Reduction | None,
     ) -> None:
-        self.arm, self.rows, self.band, self.x = arm, rows, band, x
+        self.arm = arm
+        self.rows = rows
+        self.band = band
+        self.x = x
         self.fixed = modal_model(arm, rows, 0, x).order
         self.inside = modes_in(arm, band[1])
         # pairs of poles
         self.most = (MOST_STATES - self.fixed) // 2
+        # 12 above the range: more would fit rounding
+        self.most_by_aaa = min(self.inside + 12, self.most)
         self.by_modes = method != "aaa"
         self.by_aaa = method != "modal" and has_rational(arm)
         self.ruler = Ruler(arm, rows, band, x)
@@ -236,43 +238,41 @@ class _Bench:
         pairs = self._pairs(order)
         of = (self.arm, self.rows)
         if (order - self.fixed) % 2 and self.arm.damping:
-            return self._measured(relaxed_model(*of, pairs, self.x), "modal")
+            return self._measure(relaxed_model(*of, pairs, self.x), "modal")
         found: list[ReducedModel] = []
         if self.by_aaa and pairs > self.inside:
             model = rational_model(*of, pairs, self.band[1], self.x)
-            if model.order == order:
-                few = ""
-            else:
-                few = f"order below {order}: no more poles passed the checks of AAA"
-            found.append(self._measured(model, "aaa", few))
+            note = ""
+            if model.order != order:
+                note = f"order below {order}: no more poles passed the checks of AAA"
+            found.append(self._measure(model, "aaa", note))
         if self.by_modes or not found:
-            if self.by_modes:
-                note = ""
-            else:
+            note = ""
+            if not self.by_modes:
                 note = f"method modal: AAA needs more than the {self.inside} modes in the range"
-            found.append(self._measured(modal_model(*of, pairs, self.x), "modal", note))
+            found.append(self._measure(modal_model(*of, pairs, self.x), "modal", note))
             # modes: slow poles replace omitted ones that are overdamped
             less = pairs - SLOW_PAIRS
-            if (
-                less >= 1
-                and self.arm.damping * modes(self.arm, less).natural_frequency[-1] >= SLOW_POLES_FROM
-            ):
-                found.append(self._measured(slow_model(*of, less, self.x), "modal"))
+            if less >= 1:
+                last = modes(self.arm, less).natural_frequency[-1]
+                if self.arm.damping * last >= SLOW_POLES_FROM:
+                    found.append(self._measure(slow_model(*of, less, self.x), "modal"))
         return min(found, key=lambda each: each.worst_error)
 
-    def within(self, error: float) -> ReducedModel:
-        """Return the smallest model whose error is within that one."""
-        found = [*self._few_poles(error)]
+    def smallest_within(self, error: float) -> ReducedModel:
+        """Return the smallest model whose error is at most that one."""
+        found = self._few_poles(error)
         most = self.most
         if self.arm.damping:
             found += self._few_modes(error, relaxed_model, most)
-            most = found[-1].model.index.size if found else most
+            if found:
+                most = found[-1].model.index.size
         if self.by_modes:
             found += self._few_modes(error, modal_model, most)
         if not found and self.arm.damping:
             found += self._few_modes(error, slow_model, self.most - SLOW_PAIRS)
         if not found:
-            best = self.of_order(2 * min(self.inside + MOST_TAILS, self.most) + self.fixed)
+            best = self.of_order(2 * self.most_by_aaa + self.fixed)
             message = (
                 f"no model of up to {MOST_STATES} states is within {error:g} from {self.band[0]:g} to {self.band[1]:g} "
                 f"rad/s; order {best.order} has {best.worst_error:.2g}: allow more, or narrow the range"
@@ -282,23 +282,33 @@ class _Bench:
 
     def _few_poles(self, error: float) -> list[ReducedModel]:
         """Return the smallest model by AAA within an error, if there is one."""
-        sizes = range(self.inside + 1, min(self.inside + MOST_TAILS, self.most) + 1) if self.by_aaa else ()
+        if not self.by_aaa:
+            return []
+        sizes = range(self.inside + 1, self.most_by_aaa + 1)
         models = (rational_model(self.arm, self.rows, pairs, self.band[1], self.x) for pairs in sizes)
         return self._first_within(error, models, "aaa")
 
     def _first_within(
         self, error: float, models: Iterable[PartialFractions], method: Reduction
     ) -> list[ReducedModel]:
-        measured = (self._measured(model, method) for model in models if self.ruler.rough(model) <= error)
-        return list(islice((each for each in measured if each.worst_error <= error), 1))
+        """Return the first of the models whose error is within that one, if any."""
+        for model in models:
+            if self.ruler.rough(model) <= error:
+                found = self._measure(model, method)
+                if found.worst_error <= error:
+                    return [found]
+        return []
 
     def _few_modes(
         self, error: float, make: Callable[..., PartialFractions], most: int
     ) -> list[ReducedModel]:
         """Return the smallest model of up to `most` modes within an error, if any.  By bisection, as errors fall."""
 
+        def model(count: int) -> PartialFractions:
+            return make(self.arm, self.rows, count, self.x)
+
         def rough(count: int) -> float:
-            return self.ruler.rough(make(self.arm, self.rows, count, self.x))
+            return self.ruler.rough(model(count))
 
         good = 0
         bad = -1
@@ -306,27 +316,31 @@ class _Bench:
         sizes: list[float] = []
         try:
             while (size := rough(good)) > error:
-                sizes += [size] * (good > self.inside)
+                if good > self.inside:
+                    sizes.append(size)
                 # 0.5: decrease of the error with 2.25 times the modes, at least, even for 1/n; less is its floor
-                if good == most or (len(sizes) > 2 and sizes[-1] > 0.5 * sizes[-3]):
+                is_floor = len(sizes) > 2 and sizes[-1] > 0.5 * sizes[-3]
+                if good == most or is_floor:
                     return []
-                good, bad = min(good + max(good // 2, 2), most), good
+                bad = good
+                good = min(good + max(good // 2, 2), most)
         except ConvergenceError:
             # at C > 0 no more damped modes can be separated
             return []
         while good - bad > 1:
             middle = (good + bad) // 2
-            good, bad = (middle, bad) if rough(middle) <= error else (good, middle)
+            if rough(middle) <= error:
+                good = middle
+            else:
+                bad = middle
         # 3: numbers of modes, from that of the rough error on, whose error is computed in full
         counts = range(good, min(good + 3, most + 1))
-        return self._first_within(
-            error, (make(self.arm, self.rows, count, self.x) for count in counts), "modal"
-        )
+        return self._first_within(error, map(model, counts), "modal")
 
-    def _measured(self, model: PartialFractions, method: Reduction, note: str = "") -> ReducedModel:
-        return ReducedModel(
-            model, method, self.band, *self.ruler.measure(model), *first_mode_lacking(model), note
-        )
+    def _measure(self, model: PartialFractions, method: Reduction, note: str = "") -> ReducedModel:
+        """Return a model with its error."""
+        errors, worst_at = self.ruler.measure(model)
+        return ReducedModel(model, method, self.band, errors, worst_at, *first_mode_lacking(model), note)
 
     def _pairs(self, order: object) -> int:
         """Return the number of flexible pairs of poles in a model of that order."""

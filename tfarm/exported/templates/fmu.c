@@ -98,7 +98,7 @@ static fmi2Status begin(model *m, double start) {
 
 static fmi2Status report(model *m, fmi2Status status, fmi2String text) {
     if (m->callbacks.logger)
-        m->callbacks.logger(m->callbacks.environment, m->name, status, "{{ errors }}", text);
+        m->callbacks.logger(m->callbacks.environment, m->name, status, "logStatusError", text);
     return status;
 }
 
@@ -159,6 +159,41 @@ FMI2 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Bo
     return fmi2OK;
 }
 
+{# of FMI in one statement: name, types of arguments, status #}
+{% set at = ["const fmi2ValueReference *", "size_t"] %}
+{% set absent = "report(c, fmi2Error, __func__)" %}
+{% set none_of_a_kind = "a2 ? " ~ absent ~ " : fmi2OK" %}
+{% set functions = [
+    ("SetDebugLogging", ["fmi2Boolean", "size_t", "const fmi2String *"], "fmi2OK"),
+    ("SetupExperiment", ["fmi2Boolean", "fmi2Real", "fmi2Real", "fmi2Boolean", "fmi2Real"], "begin(c, a3)"),
+    ("EnterInitializationMode", [], "fmi2OK"),
+    ("ExitInitializationMode", [], "((model *)c)->at.is_running = 1, fmi2OK"),
+    ("Terminate", [], "fmi2OK"),
+    ("Reset", [], "memset(((model *)c)->given, 0, sizeof ((model *)c)->given), begin(c, 0.0)"),
+    ("GetInteger", at + ["fmi2Integer *"], none_of_a_kind),
+    ("SetInteger", at + ["const fmi2Integer *"], none_of_a_kind),
+    ("GetBoolean", at + ["fmi2Boolean *"], none_of_a_kind),
+    ("SetBoolean", at + ["const fmi2Boolean *"], none_of_a_kind),
+    ("GetString", at + ["fmi2String *"], none_of_a_kind),
+    ("SetString", at + ["const fmi2String *"], none_of_a_kind),
+    ("GetFMUstate", ["fmi2FMUstate *"], absent),
+    ("SetFMUstate", ["fmi2FMUstate"], absent),
+    ("FreeFMUstate", ["fmi2FMUstate *"], absent),
+    ("SerializedFMUstateSize", ["fmi2FMUstate", "size_t *"], absent),
+    ("SerializeFMUstate", ["fmi2FMUstate", "fmi2Byte *", "size_t"], absent),
+    ("DeSerializeFMUstate", ["const fmi2Byte *", "size_t", "fmi2FMUstate *"], absent),
+    ("GetDirectionalDerivative", at + at + ["const fmi2Real *", "fmi2Real *"], absent),
+    ("SetRealInputDerivatives", at + ["const fmi2Integer *", "const fmi2Real *"], absent),
+    ("GetRealOutputDerivatives", at + ["const fmi2Integer *", "fmi2Real *"], absent),
+    ("CancelStep", [], absent),
+    ("GetStatus", ["fmi2StatusKind", "fmi2Status *"], "fmi2Discard"),
+    ("GetIntegerStatus", ["fmi2StatusKind", "fmi2Integer *"], "fmi2Discard"),
+    ("GetStringStatus", ["fmi2StatusKind", "fmi2String *"], "fmi2Discard"),
+    ("GetRealStatus", ["fmi2StatusKind", "fmi2Real *"],
+     "*a2 = ((model *)c)->at.time, a1 == fmi2LastSuccessfulTime ? fmi2OK : fmi2Discard"),
+    ("GetBooleanStatus", ["fmi2StatusKind", "fmi2Boolean *"],
+     "*a2 = ((model *)c)->at.is_stopped, a1 == fmi2Terminated ? fmi2OK : fmi2Discard"),
+] %}
 {% for name, types, result in functions %}
 FMI2 fmi2Status fmi2{{ name }}(fmi2Component c{% for type in types %}, {{ type }} a{{ loop.index }}{% endfor %}) {
     (void)c{% for type in types %}, (void)a{{ loop.index }}{% endfor %};

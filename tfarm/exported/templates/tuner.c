@@ -20,7 +20,7 @@ static {{ real }} polynomial({{ real }} x, const {{ real }} *coefficients, int s
     return total;
 }
 
-/* e^x for x <= 0, within {{ ulps }} units in the last place: 2^k e^r, x = k ln 2 + r (Cody and Waite), Taylor */
+/* e^x for x <= 0, within 1.5 units in the last place: 2^k e^r, x = k ln 2 + r (Cody and Waite), Taylor */
 static {{ real }} exponential({{ real }} x)
 {
     {{ real }} k, result, power = half;
