@@ -7,7 +7,7 @@ import pytest
 
 import tfarm
 from tfarm.arm import HubFeedback
-from tfarm.assessment.stability_map import sampled_region
+from tfarm.synthesis.stability_map import sampled_region
 from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.exported.live_loop import live_data

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.assessment.stability_map import sampled_region
+from tfarm.synthesis.stability_map import sampled_region
 from tfarm.case import Case
 from tfarm.crossing import pieces
 from tfarm.dsp import load_chain

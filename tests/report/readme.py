@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 import tfarm
-from tfarm.assessment.stability_map import stable_regions
+from tfarm.synthesis.stability_map import stable_regions
 from tfarm.case import Case
 from tfarm.digits import plain
 from tfarm.dsp import load_chain

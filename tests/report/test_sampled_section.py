@@ -14,7 +14,7 @@ import tfarm
 from tests.report.written import blocks_of, values_of
 from tfarm.arm import HubFeedback
 from tfarm.arm.chain import Converters, Sampling
-from tfarm.assessment.stability_map import CUT_RANGE, K2_RANGE, stable_regions
+from tfarm.synthesis.stability_map import CUT_RANGE, K2_RANGE, stable_regions
 from tfarm.case import Case
 from tfarm.digits import kept_digits
 from tfarm.dsp import Chain, Simulator, scenario

@@ -4,7 +4,6 @@ card            result card: stability, damping, margins and their grades; loop 
 signal_figures  figures of signals over time: peak, settling time, overshoot and others
 step            time responses of both loops with these figures
 comparison      two arms or two controllers
-stability_map   stability regions of the gains K1 and K2, and their map
 arm_check       an arm's file: derived numbers, warnings, tables left out
 """
 

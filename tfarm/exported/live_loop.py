@@ -24,7 +24,7 @@ from tfarm.assessment.card import (
     GRADED,
     graded_arm,
 )
-from tfarm.assessment.stability_map import BEYOND_PICTURE, sampled_region
+from tfarm.synthesis.stability_map import BEYOND_PICTURE, sampled_region
 from tfarm.case import Case
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits

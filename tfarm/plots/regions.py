@@ -18,7 +18,7 @@ from scipy import ndimage
 from tfarm.arm import MOMENT_GAIN, PLANE
 from tfarm.arrays import Real, Whole
 from tfarm.assessment import Comparison
-from tfarm.assessment.stability_map import StabilityMap
+from tfarm.synthesis.stability_map import StabilityMap
 from tfarm.crossing import Window, pieces
 from tfarm.digits import how_many, plain, scientific, significant
 from tfarm.loop.circle_crossings import GainMap

@@ -9,7 +9,7 @@ from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, unit_of, warn_of_cancellati
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.arrays import Real
-from tfarm.assessment.stability_map import DESIGNED_MODES
+from tfarm.synthesis.stability_map import DESIGNED_MODES
 from tfarm.digits import plain, significant
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError

@@ -20,7 +20,7 @@ from tfarm.arm.chain import MOST_DELAY, file_text
 from tfarm.arm.writing import law_toml
 from tfarm.assessment.card import ResultCard, margins_of, result_card, sampled_of
 from tfarm.assessment.card import loop_function as loop_curve
-from tfarm.assessment.stability_map import (
+from tfarm.synthesis.stability_map import (
     DESIGNED_MODES,
     StabilityMap,
     StableRegions,

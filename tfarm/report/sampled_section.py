@@ -11,7 +11,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, shown_unit
-from tfarm.assessment.stability_map import StableRegions
+from tfarm.synthesis.stability_map import StableRegions
 from tfarm.assessment.step import Step
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain, Simulation, scenarios, traces

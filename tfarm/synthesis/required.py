@@ -152,8 +152,8 @@ class RequirementTask:
             near = x
             goal = goal.tighter(np.where(violations > 0, 1.1 * violations + 1e-5, 0.0))
         if best is None or not np.isfinite(best.violation):
-            law = None if best is None else best.law
-            raise ConvergenceError("no law of the structure is stable on all arms", law, None)
+            nearest = None if best is None else best.law
+            raise ConvergenceError("no law of the structure is stable on all arms", nearest, None)
         return best
 
     def score_on(self, choice: RequiredLaw, on: Arm) -> float:

@@ -76,7 +76,7 @@ class Requirement(NamedTuple):
 
     def violation(self, value: float) -> float:
         """Return the excess of one value."""
-        return float(self.violations(np.float64(value)))
+        return float(self.violations(np.array([value]))[0])
 
     def __str__(self) -> str:
         """As it is written in a file or after --require."""

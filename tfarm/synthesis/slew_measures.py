@@ -10,7 +10,8 @@ from tfarm.arm import AnyLaw, Arm
 from tfarm.case import Case
 from tfarm.dsp import Chain, Scenario, traces
 from tfarm.dsp.scenarios import scenario
-from tfarm.dsp.simulate import Simulator, final_value, settling_time
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.simulation import final_value, settling_time
 from tfarm.records import frozen
 from tfarm.spectrum.table import first_frequency
 
