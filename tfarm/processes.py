@@ -19,17 +19,17 @@ from tfarm.stopping import SIGNALS, undone_if_stopped
 
 BLAS = "OPENBLAS_NUM_THREADS"
 
-Task = TypeVar("Task")
+Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 
 def share_tasks(
-    tasks: Iterable[tuple[Task, Callable[[], Result]]],
+    tasks: Iterable[tuple[Job, Callable[[], Result]]],
     count: int,
-    begun: Callable[[Sequence[Task]], object] = lambda _: None,
+    begun: Callable[[Sequence[Job]], object] = lambda _: None,
     *,
     joins: bool = False,
-) -> Iterator[tuple[Task, Result]]:
+) -> Iterator[tuple[Job, Result]]:
     """Yield each task with its result as it comes, by `count` processes, or by this one for a count of 1.
 
     Where this one `joins`, it is one of them: a process less to start.
@@ -43,7 +43,7 @@ def share_tasks(
         return
     # which may make each task only when there is a process for it
     waiting = iter(tasks)
-    running: dict[Future[Result], Task] = {}
+    running: dict[Future[Result], Job] = {}
     others = count - joins
     with _pool(others) as pool:
 

@@ -175,7 +175,7 @@ class SignalCurve(NamedTuple):
         return bool((self.bound <= most).all()) and peak.bound <= most
 
 
-@dataclass(frozen=True)
+@frozen
 class LoopRecord:
     """Times [s] of the signals of a loop, the names of those of hub and tip, root moment and torque, and references.
 

@@ -30,7 +30,7 @@ TEMPLATES = Path(__file__).parent / "templates"
 # folders in that of an arm
 PICTURES = "pictures"
 DATA = "data"
-Record = TypeVar("Record")
+PageRecord = TypeVar("PageRecord")
 # between title and caption, which no name has in it
 PART = "\ue000"
 PROMISES = (
@@ -291,7 +291,7 @@ def keep(folder: Path, kind: str, content: Mapping[str, Any]) -> None:
     write_text(folder / f"{kind}.json", f"{text}\n")
 
 
-def kept_in(folder: Path, kind: str, record: type[Record]) -> Record | None:
+def kept_in(folder: Path, kind: str, record: type[PageRecord]) -> PageRecord | None:
     """Return the record in a folder's kind.json; None where there is none, or none of ours."""
     try:
         return TypeAdapter(record).validate_json((folder / f"{kind}.json").read_bytes())
@@ -299,9 +299,9 @@ def kept_in(folder: Path, kind: str, record: type[Record]) -> Record | None:
         return None
 
 
-def read_records(out: Path, kind: str, record: type[Record]) -> dict[Path, Record]:
+def read_records(out: Path, kind: str, record: type[PageRecord]) -> dict[Path, PageRecord]:
     """Return the records of that kind in the folders of arms, by folder; what is none of ours is passed over."""
-    found: dict[Path, Record] = {}
+    found: dict[Path, PageRecord] = {}
     for folder in sorted(out.iterdir(), key=lambda folder: folder.name):
         if folder.is_dir() and not folder.name.startswith("."):
             each = kept_in(folder, kind, record)

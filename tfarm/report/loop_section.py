@@ -16,7 +16,6 @@ from tfarm.errors import ConvergenceError, TfarmError
 from tfarm.loop.loci import Loci, round_branches
 from tfarm.loop.margins import Margins
 from tfarm.loop.nyquist import Nyquist
-from tfarm.loop.plane import deepest_moment_gain
 from tfarm.loop.poles import Poles
 from tfarm.plots import loop_function, regions, roots
 from tfarm.report.blocks import (
@@ -193,7 +192,7 @@ def map_section(report: ArmReport) -> PageSection:
         chain=report.chain,
         band=report.band,
         unit=f"{plain(report.rate_unit, 4)} {unit_of(RATE_GAIN, arm)}",
-        deepest=deepest_moment_gain(arm),
+        deepest=report.deepest_moment_gain,
     )
     return PageSection(
         title="Stability region of both gains", facts=continuous_interval_facts(report), blocks=(drawn,)

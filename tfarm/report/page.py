@@ -46,6 +46,7 @@ from tfarm.loop.curve import LoopCurve
 from tfarm.loop.loci import Loci, loci
 from tfarm.loop.margins import Margins, margins
 from tfarm.loop.nyquist import Nyquist, nyquist_of
+from tfarm.loop.plane import deepest_moment_gain
 from tfarm.loop.plane_axes import ranges_of
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.loop.sampled_analysis import Analysis
@@ -336,6 +337,11 @@ class ArmReport(NamedTuple):
     def rate_unit(self) -> float:
         """The unit of the rate gain, J w1."""
         return rate_unit(self.arm)
+
+    @property
+    def deepest_moment_gain(self) -> float:
+        """The lowest moment gain at which unstable gains are searched."""
+        return deepest_moment_gain(self.arm)
 
     @property
     def regions(self) -> StableRegions:

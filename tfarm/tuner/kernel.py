@@ -42,7 +42,7 @@ CONSUMER = Consumer(
 )
 
 
-class Input(IntEnum):
+class NetworkInput(IntEnum):
     """Inputs of the network; the last is optional."""
 
     U_NOW = 0
@@ -231,16 +231,16 @@ def sense(k: int, setting: Setting, run: TrialSignals, work: SampleBuffers) -> b
     run.moment[k] = dot(model.own, work.state)
     run.u[k] = reference.counted[k] + reference.servo[k] - dot(model.servo, work.state)
     inputs.fill(0.0)
-    inputs[Input.U_NOW] = run.u[k]
-    inputs[Input.X_NOW] = run.x[k]
+    inputs[NetworkInput.U_NOW] = run.u[k]
+    inputs[NetworkInput.X_NOW] = run.x[k]
     if k >= 1:
-        inputs[Input.U_BEFORE] = run.u[k - 1]
-        inputs[Input.E_BEFORE] = run.e[k - 1]
-        inputs[Input.X_BEFORE] = run.x[k - 1]
-        if inputs.size > Input.K_BEFORE:
-            inputs[Input.K_BEFORE] = run.K[k - 1]
+        inputs[NetworkInput.U_BEFORE] = run.u[k - 1]
+        inputs[NetworkInput.E_BEFORE] = run.e[k - 1]
+        inputs[NetworkInput.X_BEFORE] = run.x[k - 1]
+        if inputs.size > NetworkInput.K_BEFORE:
+            inputs[NetworkInput.K_BEFORE] = run.K[k - 1]
     if k >= 2:
-        inputs[Input.E_TWO_BEFORE] = run.e[k - 2]
+        inputs[NetworkInput.E_TWO_BEFORE] = run.e[k - 2]
     for i in range(inputs.size):
         inputs[i] /= setting.scales[i]
     return True
@@ -301,16 +301,16 @@ def backward(setting: Setting, weights: Real, run: TrialSignals, work: SampleBuf
         gain_gradient(weights, run.inputs[k], run.hidden[k], by_sum, gradient, by_input)
         for i in range(m):
             by_input[i] /= setting.scales[i]
-        by_u = by_e + by_input[Input.U_NOW] + late_u
-        by_x = T * a * run.x[k] - run.K[k] * by_e + by_input[Input.X_NOW] + late_x
+        by_u = by_e + by_input[NetworkInput.U_NOW] + late_u
+        by_x = T * a * run.x[k] - run.K[k] * by_e + by_input[NetworkInput.X_NOW] + late_x
         turn(model.A, back, spare)
         for i in range(back.size):
             back[i] = spare[i] + model.moment[i] * by_x - model.servo[i] * by_u
-        late_e = later_e + by_input[Input.E_BEFORE]
-        later_e = by_input[Input.E_TWO_BEFORE]
-        late_u = by_input[Input.U_BEFORE]
-        late_x = by_input[Input.X_BEFORE]
-        late_K = by_input[Input.K_BEFORE] if m > Input.K_BEFORE else 0.0
+        late_e = later_e + by_input[NetworkInput.E_BEFORE]
+        later_e = by_input[NetworkInput.E_TWO_BEFORE]
+        late_u = by_input[NetworkInput.U_BEFORE]
+        late_x = by_input[NetworkInput.X_BEFORE]
+        late_K = by_input[NetworkInput.K_BEFORE] if m > NetworkInput.K_BEFORE else 0.0
 
 
 @compiled
