@@ -24,7 +24,6 @@ from tfarm.assessment.card import (
     GRADED,
     graded_arm,
 )
-from tfarm.synthesis.stability_map import BEYOND_PICTURE, sampled_region
 from tfarm.case import Case
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits
@@ -47,6 +46,7 @@ from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
 from tfarm.response import transfer
 from tfarm.spectrum.gains import angle_unit, default_gains
+from tfarm.synthesis.stability_map import BEYOND_PICTURE, sampled_region
 
 CONSUMER = Consumer(
     "live page",

@@ -18,7 +18,6 @@ from scipy import ndimage
 from tfarm.arm import MOMENT_GAIN, PLANE
 from tfarm.arrays import Real, Whole
 from tfarm.assessment import Comparison
-from tfarm.synthesis.stability_map import StabilityMap
 from tfarm.crossing import Window, pieces
 from tfarm.digits import how_many, plain, scientific, significant
 from tfarm.loop.circle_crossings import GainMap
@@ -44,6 +43,7 @@ from tfarm.plots.style import (
     safe,
     zero_line,
 )
+from tfarm.synthesis.stability_map import StabilityMap
 
 # proven by the argument of the paper at C = 0
 LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)

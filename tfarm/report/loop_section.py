@@ -9,7 +9,6 @@ from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, unit_of, warn_of_cancellati
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.arrays import Real
-from tfarm.synthesis.stability_map import DESIGNED_MODES
 from tfarm.digits import plain, significant
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError
@@ -33,6 +32,7 @@ from tfarm.report.overview import results
 from tfarm.report.page import ArmReport, PageCase, has_loop, sign_words
 from tfarm.response.signals import Signals, sign_convention
 from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table, text
+from tfarm.synthesis.stability_map import DESIGNED_MODES
 
 # ------------------------------------------------------------ margins
 

@@ -20,13 +20,6 @@ from tfarm.arm.chain import MOST_DELAY, file_text
 from tfarm.arm.writing import law_toml
 from tfarm.assessment.card import ResultCard, margins_of, result_card, sampled_of
 from tfarm.assessment.card import loop_function as loop_curve
-from tfarm.synthesis.stability_map import (
-    DESIGNED_MODES,
-    StabilityMap,
-    StableRegions,
-    stability_map,
-    stable_regions,
-)
 from tfarm.assessment.step import Step, step
 from tfarm.audit import AuditRow, kept_audit
 from tfarm.audit.arm_proofs import ArmProof, prove, proven_damped_modes, proven_modes
@@ -72,6 +65,13 @@ from tfarm.studies.candidates import (
     tuner_numbers,
 )
 from tfarm.synthesis.design import Design, design
+from tfarm.synthesis.stability_map import (
+    DESIGNED_MODES,
+    StabilityMap,
+    StableRegions,
+    stability_map,
+    stable_regions,
+)
 
 # at most: a second of computing
 FILM_FRAMES = 80

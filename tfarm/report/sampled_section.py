@@ -11,7 +11,6 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, Arm, shown_unit
-from tfarm.synthesis.stability_map import StableRegions
 from tfarm.assessment.step import Step
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain, Simulation, scenarios, traces
@@ -32,6 +31,7 @@ from tfarm.report.blocks import (
 from tfarm.report.page import ArmReport, PageCase, has_loop
 from tfarm.schema import Column, Quantity, Table, across, table, text
 from tfarm.studies.candidates import WITHOUT, TunerNumbers
+from tfarm.synthesis.stability_map import StableRegions
 
 
 def sampled_section(report: ArmReport) -> PageSection:

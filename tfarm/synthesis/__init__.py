@@ -6,4 +6,12 @@ judge       objectives, and scores of laws in a loop of few modes
 models      loops of few modes under many laws at once, and slews in them
 search      differential evolution from several starts, then a simplex
 worst_case  designs for several arms and for the worst inside a box
+
+requirements    limits of quantities of card and slew, by name
+measures        margins, damping and speed of many laws at once, on a model
+slew_measures   figures of the slew of a law, simulated
+goals           the least value of a quantity under requirements, and their exact values
+required        the search for a law that meets requirements, and conflicts where none does
+trade_off       the front of speed against robustness
+stability_map   stability regions of the gains K1 and K2, and their map
 """

@@ -1,8 +1,8 @@
-"""Laws that meet requirements: least value of a quantity among them, found on models and examined by the exact loops.
+"""Laws that meet requirements: the least value of a quantity, found on models and examined by the exact loops.
 
 1. Differential evolution on a model of few modes minimises log q + w sum max(0, v), q a quantity of the loop and v the
-   violations: an exact penalty (Fletcher, Practical Methods of Optimization, 1987, sec. 12.3), whose minimum lies on the
-   limits where the weight w is above the multipliers.
+   violations: an exact penalty (Fletcher, Practical Methods of Optimization, 1987, sec. 12.3), whose minimum lies on
+   the limits where the weight w is above the multipliers.
 2. A simplex of Nelder and Mead minimises quantities of the slew, which is simulated with its converters.
 3. The result card of the exact loops has the last word.  What it has less than the model tightens the requirement on the
    model, and the search goes on from there.
@@ -224,7 +224,7 @@ class Checked(NamedTuple):
 
 
 def check(goal: Goal, judge: Any, named: NamedArm, law: AnyLaw) -> tuple[list[Checked], Real]:
-    """Return the requirements with the exact values of a law on an arm, and violations (2, requirements) of the loops."""
+    """Return the requirements with exact values of a law on an arm, and violations (2, requirements) of the loops."""
     values = exact_values(Case(named.arm, law, judge.chain), slew_of(judge) if goal.by_simulation else None)
     rows = []
     violations = np.full((2, len(goal.requirements)), -1.0)

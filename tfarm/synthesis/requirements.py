@@ -68,7 +68,7 @@ class Requirement(NamedTuple):
         return MEASURES[self.name]
 
     def violations(self, values: Real) -> Real:
-        """Return the excess over the limit in units of the limit, negative where the requirement is met, at least -1."""
+        """Return the excess over the limit in units of the limit, negative where it is met, at least -1."""
         size = abs(self.limit) or self.measure.scale
         sign = 1.0 if self.sense == ">=" else -1.0
         excess = sign * (self.limit - np.asarray(values, dtype=float)) / size
@@ -104,8 +104,8 @@ def requirements_of(
 ) -> tuple[Requirement, ...]:
     """Return the requirements of a text, a table, or a sequence of them.
 
-    A text is a list such as "GM>=6, PM>=45, damping>=2%"; "good" stands for the limits of the grade.  A table has a limit
-    for each name, {"phase_margin": 45}; its sense is that of a good value.
+    A text is a list such as "GM>=6, PM>=45, damping>=2%"; "good" stands for the limits of the grade.  A table has a
+    limit for each name, {"phase_margin": 45}; its sense is that of a good value.
     Raises ParameterError for an unknown name, a limit that is no finite number, and the sense that is never good.
     """
     if isinstance(wanted, str):

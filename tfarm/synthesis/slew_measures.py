@@ -1,4 +1,4 @@
-"""Figures of the slew of a law in the sampled loop with its converters: settling, overshoot, residual, largest input."""
+"""Figures of the slew of a law in the sampled loop: settling time, overshoot, residual moment, largest input."""
 
 from __future__ import annotations
 
