@@ -43,7 +43,7 @@ HELD = HeldLoop(LAB, 0.01)
 @pytest.mark.parametrize("name", thinned(tfarm.presets(), 8))
 def test_what_is_recommended_holds_when_sampled(name):
     """By the whole verdict, at the gains and a quarter to either side, and in continuous time."""
-    found = design(tfarm.load(name), chain=tfarm.dsp.load_chain(name))
+    found = design(tfarm.load(name), "damping", chain=tfarm.dsp.load_chain(name))
     laws = [found.law.times(share) for share in (1 / RESERVE, 1.0, RESERVE)]
     assert all(sampled_verdict(Case(tfarm.load(name), law, found.chain)).is_stable for law in laws)
     assert found.sampled.is_stable
@@ -112,7 +112,7 @@ def test_the_residual_moment_scales_with_the_mass_of_a_similar_arm():
 def test_gains_for_a_random_rig_hold_on_another_model_and_nothing_is_recommended_where_nothing_holds():
     late = Chain(sampling=Sampling(delay_samples=3.0))
     with pytest.raises(ConvergenceError, match="widen the bounds"):
-        design(replace(LAB, name="late"), K1=(30.0, 60.0), K2=(-3.0, -2.0), chain=late)
+        design(replace(LAB, name="late"), "damping", K1=(30.0, 60.0), K2=(-3.0, -2.0), chain=late)
     over, own, _ = excess(np.random.default_rng([1, 0]), (TWO_GAINS,))
     assert over <= 0
     assert own < 0

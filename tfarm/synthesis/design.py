@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, must_turn
+from tfarm.arm import TWO_GAINS, AnyLaw, Arm, must_turn
 from tfarm.arm.stages import Consumer
 from tfarm.case import Case
 from tfarm.dsp import Chain
@@ -22,16 +22,14 @@ from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.errors import require as require_that
 from tfarm.loop.continuous import ContinuousLoop
-from tfarm.loop.edges import most_modes
 from tfarm.loop.sampled_brief import SampledBrief, sampled_brief
-from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.synthesis.goals import Checked
 from tfarm.synthesis.judge import LOST, OBJECTIVES, TOO_SLOW, Judge, judge_of, model_sizes
 from tfarm.synthesis.models import slew_and_after, trial_slew
-from tfarm.synthesis.required import RequiredLaw, RequirementTask, Sensitivity, is_active, names_of
+from tfarm.synthesis.required import RequiredLaw, RequirementTask, Sensitivity, is_active, names_of, why_none
 from tfarm.synthesis.requirements import MEASURES, Wanted, measure_named, requirements_of
 from tfarm.synthesis.search import Search, Worst, flat_part, search
 from tfarm.synthesis.structures import STRUCTURES, Bounds, Structure, check_bounds, structure_of
@@ -312,7 +310,8 @@ def design(
     Objectives without requirements are "damping" of the first `modes` modes, "margin", "sensitivity", "delay",
     "residual" and "cost", of laws with a dominant time constant of at most four periods of mode 1, or 50 samples.  The
     law is stable when sampled, with all gains a quarter larger or smaller, and in continuous time.
-    `continuous`: for the continuous-time loop instead; its best law may be unstable when sampled.
+    `continuous`: for the continuous-time loop instead, by "damping" unless another objective is named; its best law may
+    be unstable when sampled.
     `progress` is called with one line at a time.
 
     `also` are further arms for the law, `ranges` the ends of numbers of the arm, such as {"payload.mass": (0.1, 0.5)}.
@@ -321,6 +320,8 @@ def design(
     are those of the arm itself.  Raises ParameterError for options that exclude each other, ConvergenceError where no
     stable law is found.
     """
+    if continuous and objective is None and require is None:
+        objective = "damping"
     is_plain = require is None and objective in OBJECTIVES
     remedy = "requirements are of both loops: leave out the continuous-time loop"
     require_that(is_plain or not continuous, "continuous", continuous, remedy)
@@ -367,17 +368,18 @@ def trade_off(
     chain: Chain | None = None,
     progress: Tell | None = None,
     also: Sequence[Arm] = (),
+    number: int = 12,
 ) -> TradeOff:
-    """Return the front of speed against robustness: 12 designs, from 0.4 to 1.9 times the limits of the grade good.
+    """Return the front of speed against robustness: designs from 0.4 to 1.9 times the limits of the grade good.
 
     Arguments are those of `design`; the dominant time constant is minimised unless another quantity is named.
-    Requirements of other quantities than gain, phase and delay margin and Ms hold at
-    every point.  Raises ParameterError as `design` does, ConvergenceError where no law is stable on all arms.
+    Requirements of other quantities than gain, phase and delay margin and Ms hold at every one of the `number` designs.
+    Raises ParameterError as `design` does, ConvergenceError where no law is stable on all arms.
     """
     options = _Options(
         arm, structure, {"K1": K1, "K2": K2}, Kp, modes, chain or Chain(), tuple(also), None, progress
     )
-    return front(*options.task(objective or "time-constant", require))
+    return front(*options.task(objective or "time-constant", require), number)
 
 
 @frozen
@@ -505,7 +507,7 @@ class _DesignTask:
         score, x = nearest
         law = self.form.record_at(x)
         chain = None if self.continuous else self.chain
-        words = _why_none(named, self.form, law, chain, max(map(max, sizes)))
+        words = why_none(named, self.form, law, chain, max(map(max, sizes)))
         if len(named) > 1:
             words = f"{words}; for {len(named)} arms at once: {'; '.join(each.name for each in named)}"
         raise ConvergenceError(words, law, score)
@@ -562,29 +564,4 @@ def _record(
         starts=choice.search.starts,
         agreed=choice.search.agreed,
         worst_case=case,
-    )
-
-
-def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Chain | None, size: int) -> str:
-    """Return the most unstable mode under the law nearest to stability when sampled, the bounds, and a remedy.
-
-    `size` is the number of modes of the largest model.
-    """
-    within = " and ".join(f"{each.name} in ({each.bounds[0]:g}, {each.bounds[1]:g})" for each in form.free)
-    text = f"no law {form.name} with {within} was found that is stable"
-    if chain is None:
-        return f"{text}: widen the bounds"
-    verdicts = [sampled_verdict(Case(each.arm, law, chain)) for each in arms]
-    verdict = max(verdicts, key=attrgetter("log_radius"))
-    growth = np.expm1(verdict.log_radius)
-    nearest = f"{verdict.slowest} grows by {growth:.2g} a sample" if growth > 0 else "there is no reserve"
-    remedy = f"widen the bounds, or try another {ANGLE_GAIN} or period"
-    text = f"{text} when sampled: under the nearest law {nearest}; {remedy}"
-    if any(most_modes(each.arm, chain) > size for each in arms if not each.arm.has_elastic_link):
-        text = f"{text}; only models of up to {size} modes were searched"
-    if not verdict.loop.plant.arm.has_elastic_link or form.name == TWO_GAINS:
-        return text
-    return (
-        f"{text}; with link.damping = 0 every mode that the law does not damp at its alias is unstable under a held "
-        f"input: give link.damping, or take {TWO_GAINS}"
     )

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Annotated, Any, NamedTuple, cast
 
@@ -43,12 +44,14 @@ SHARE_OF_SPEED = 0.05
 class Goal:
     """The least value of a quantity under requirements, as an objective of a judge.
 
-    `shifts` tighten each requirement of the sampled (0) and of the continuous-time loop (1) on the model.
+    `shifts` tighten each requirement of the sampled (0) and of the continuous-time loop (1) on the model; `delays` are
+    further delays [periods] with which the sampled loop has to be stable.
     """
 
     requirements: tuple[Requirement, ...]
     minimised: str
     shifts: tuple[tuple[float, ...], tuple[float, ...]]
+    delays: tuple[float, ...] = ()
 
     is_negated = False
     of_slew = False
@@ -64,7 +67,7 @@ class Goal:
     def tighter(self, shifts: Real) -> Goal:
         """Return the goal with more (2, requirements) of each shift."""
         more = np.array(self.shifts) + shifts
-        return Goal(self.requirements, self.minimised, (tuple(more[0].tolist()), tuple(more[1].tolist())))
+        return replace(self, shifts=(tuple(more[0].tolist()), tuple(more[1].tolist())))
 
     def scores(self, judge: Any, entries: Sequence[Entry], poles: Any) -> Real:
         """Return the scores of laws that are stable on the model (laws,)."""
@@ -98,7 +101,7 @@ class Goal:
 
     def excess(self, judges: Sequence[Any], law: AnyLaw) -> float:
         """Return the sum of violations of a law on the models, the largest of the arms, without shifts."""
-        plain = Goal(self.requirements, self.minimised, (self.none, self.none))
+        plain = replace(self, shifts=(self.none, self.none))
         found = []
         for judge in judges:
             entries = judge.entries(law)
