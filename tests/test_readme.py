@@ -68,7 +68,8 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
     if verb == "proof":
         verb = f"proof {words.pop(0)}"
     command = commands_of(whole_command())[verb]
-    (tmp_path / "my-arm.toml").touch()
+    for name in ("my-arm.toml", "good.toml"):
+        (tmp_path / name).touch()
     command.make_context(verb, list(words))
     with pytest.raises(TyperException, match="no-such-option"):
         command.make_context(verb, [*words, "--no-such-option"])
