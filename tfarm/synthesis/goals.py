@@ -4,8 +4,8 @@
    violations: an exact penalty (Fletcher, Practical Methods of Optimization, 1987, sec. 12.3), whose minimum lies on
    the limits where the weight w is above the multipliers.
 2. A simplex of Nelder and Mead minimises quantities of the slew, which is simulated with its converters.
-3. The result card of the exact loops has the last word.  What it has less than the model tightens the requirement on the
-   model, and the search goes on from there.
+3. The result card of the exact loops has the last word.  What it has less than the model tightens the requirement on
+   the model, and the search goes on from there.
 """
 
 from __future__ import annotations
@@ -120,7 +120,9 @@ class Goal:
         speed = float(measures.dominant_time_constant(first_frequency(judge.arm))[0])
         figures = slew.of(law)
         if self.minimised == "settling_time_s":
-            score += float(np.log(figures[self.minimised] + SHARE_OF_SPEED * speed))
+            # a tip that does not settle in the longest record: of such laws the fastest is the best
+            settled = min(figures[self.minimised], 100.0 * speed)
+            score += float(np.log(settled + SHARE_OF_SPEED * speed))
         elif _is_of_slew(self.minimised):
             score += float(np.log(max(figures[self.minimised], LEAST_SIZE)))
         else:
