@@ -142,7 +142,8 @@ class Other:
         entries = judge.entries(law)
         loop = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
         speed = float(loop.dominant_time_constant(first_frequency(judge.arm))[0])
-        return self.slew.of(law)["settling_time_s"] + SHARE_OF_SPEED * speed
+        # as of tfarm's score, where the tip of a slow loop does not settle in the longest record
+        return min(self.slew.of(law)["settling_time_s"], 100 * speed) + SHARE_OF_SPEED * speed
 
     def of_model(self, x):
         """Scores (m,) of points (n, m) by the model."""
