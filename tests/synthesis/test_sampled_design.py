@@ -121,8 +121,8 @@ def test_gains_for_a_random_rig_hold_on_another_model_and_nothing_is_recommended
 DATA = Path(__file__).parents[1] / "data" / "reproductions"
 ARMS = {name: tfarm.load(DATA / f"{name}.toml") for name in ("r2", "r3", "r7")}
 BETTER = {  # coefficients after Kp, and the residual [N m] or the damping ratio
-    ("r2", "PD+notch", "residual"): ((9.422306, 200.0, 135.19767, 0.6302521, 2.4058711), 1.254325),
-    ("r3", "PD", "residual"): ((13.563,), 0.0642307),
+    ("r2", "PD+notch", "residual"): ((6329.0, 199.99, 84.06, 1.069, 690.17), 0.8652847),
+    ("r3", "PD", "residual"): ((13.36855438,), 0.06389279),
     ("r7", "K1-K2", "damping"): ((255.54, -17.616), 0.0268544),
 }
 AS_GOOD = 1e-3  # relative: so near to the better value a design has to come
@@ -130,7 +130,9 @@ AS_GOOD = 1e-3  # relative: so near to the better value a design has to come
 
 @pytest.mark.parametrize(("name", "structure", "objective"), thinned([*BETTER][::-1], 2))
 def test_a_design_is_at_least_as_good_as_a_known_stable_law(name, structure, objective):
-    """Designs left 1.48154 and 0.0943552 N m; 0.0239651 was where the first bounds of K2 ended."""
+    """The best of 16 evolution strategies of 77,000 laws, and of 20,001 values of K1; 0.0239651 was where the first
+    bounds of K2 ended.
+    """
     arm, (at, value) = ARMS[name], BETTER[name, structure, objective]
     form = structure_of(structure, arm, Kp=0.0, modes=2, period=Chain().sampling.period, bounds={})
     law = form.record_at(form.at(at))
