@@ -54,9 +54,11 @@ def start_of(name):
 
 @pytest.mark.parametrize("name", thinned([each for each in STRUCTURES if each != "PI"], 3))  # which needs friction
 def test_a_law_of_each_structure_is_judged_as_by_another_model(name):
-    """Margin, peak of S and, without the higher modes, the radius."""
+    """Margin, peak of S and, without the higher modes, the radius; of a stable law with smaller gains."""
     law = start_of(name)
-    if HELD.radius(law) >= 1:
+    for _ in range(3):
+        if HELD.radius(law) < 1:
+            break
         assert judge_of(LAB, law, "margin").score(law) >= 1e3
         law = law.times(0.3)
     assert HELD.radius(law) < 1

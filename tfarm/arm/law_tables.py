@@ -36,6 +36,7 @@ class LawTable(StrictTable):
     references: list[str] = Field(default_factory=list)
     rule: str = "tustin"
     prewarp: float = 0.0
+    anti_windup: float = 0.0
     matrices: str | None = None
     system: str | None = None
     signals: list[str] | None = None
