@@ -15,12 +15,12 @@ import tfarm
 from tests.shared import refusal, sized
 from tests.studies import kills
 from tfarm.dsp import Chain
+from tfarm.ensemble.declaration import load_study
+from tfarm.ensemble.space import extra
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.files import locked_folder
 from tfarm.studies import running
-from tfarm.studies.declaration import load_study
 from tfarm.studies.running import rows_a_chunk
-from tfarm.studies.space import extra
 
 LAB = tfarm.load("sasaki2012-lab")
 STUDY = partial(tfarm.study, LAB, kills.OVER, ("modes",), None, Chain())

@@ -25,12 +25,13 @@ import numpy as np
 from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
 from tfarm.case import Case
+from tfarm.ensemble.declaration import STUDY_FILE
+from tfarm.ensemble.space import Space, Subject, Subjects, extra, parquet
 from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line, require
 from tfarm.files import write_file
 from tfarm.records import frozen
 from tfarm.stopping import Progress
 from tfarm.studies.quantities import FAILED, Values, prepare, quantity_of, sources_of, values_of
-from tfarm.studies.space import Space, Subject, Subjects, extra, parquet
 
 # columns of a range of rows
 Chunk = dict[str, list[Any]]
@@ -61,7 +62,6 @@ OUT = "--out"
 # column of the number of the row, from 0
 ROW = "row"
 PARQUET = ".parquet"
-STUDY_FILE = "study.toml"
 # rows whose arms are built before the first run
 CHECKED = 1000
 

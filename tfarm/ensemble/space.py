@@ -1,4 +1,4 @@
-"""Values over which a study varies an arm and its loop: distributions, grids, lists of rows, the posterior of a fit.
+"""Values over which an ensemble varies an arm and its loop: distributions, grids, lists of rows, a posterior of a fit.
 
 Row n depends on the seed and on n alone: its uniform numbers are those of the counter-based generator Philox (Salmon et
 al., Parallel random numbers: as easy as 1, 2, 3, 2011) at counter n, and each distribution is applied by its inverse.
@@ -75,7 +75,7 @@ class Distribution(NamedTuple):
 
 
 class Subject(NamedTuple):
-    """One case of a study, with numbers of the tuner."""
+    """One case of an ensemble, with numbers of the tuner."""
 
     case: Case
     tuner: dict[str, float]
@@ -99,7 +99,7 @@ class Listing(NamedTuple):
 
 @frozen(kw_only=True)
 class Space:
-    """Numbers that a study varies; `draws` of the distributions, each with every point of the grid.
+    """Numbers that vary in an ensemble; `draws` of the distributions, each with every point of the grid.
 
     The rows of a list are counted in the place of draws.
     """
