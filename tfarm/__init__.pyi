@@ -44,6 +44,7 @@ from tfarm.spectrum import modes as modes
 from tfarm.spectrum.gains import default_gains as default_gains
 from tfarm.studies.study import study as study
 from tfarm.synthesis.design import design as design
+from tfarm.synthesis.design import trade_off as trade_off
 from tfarm.tuner import tune as tune
 
 Case = CaseFace

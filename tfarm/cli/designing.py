@@ -46,7 +46,8 @@ study_command = partial(add_command, "Study")
 def design(
     *,
     arm: ArmName,
-    objective: str = "damping",
+    objective: Annotated[str | None, typer.Option("--minimise", "--objective")] = None,
+    require: Annotated[str | None, typer.Option("--require", metavar="LIST")] = None,
     structure: Annotated[
         str,
         typer.Option("--structure", help="form of the law, such as PD+notch; any other word lists them all"),
@@ -65,37 +66,56 @@ def design(
     over: Annotated[
         list[Any] | None, typer.Option("--range", parser=name_and(interval), metavar="KEY=LO,HI")
     ] = None,
+    trade_off: Annotated[bool, typer.Option("--trade-off")] = False,
     save: File = None,
     theory: TheoryName = None,
     chain: Any = chain_of_options,
-    show: Any = emit_record,
+    show: Any = emit,
 ) -> None:
-    """Law of a structure with the best objective in the sampled loop.
+    """Law that meets requirements, with the least settling time.
 
+    Requirements are those of --require, of the file's table [requirements], or else the limits of the grade good.
     The sampling period is that of the file, or else 10 ms.
 
     Options:
-    objective: damping, margin, sensitivity, delay, residual or cost (of the tuner)
+    objective: settling, time-constant, torque, Ms ...; without requirements: damping, margin, sensitivity, delay,
+        residual or cost (of the tuner)
+    require: requirements such as "GM>=6, PM>=45, Ms<=2, delay>=1, damping>=2%, torque<=5, settling<=1.5"
+    trade_off: the front of speed against robustness instead: 12 designs; --save writes each beside FILE
     continuous: for the continuous-time loop
     also: further arm; the objective is the worst of all; may be repeated
     over: range of a number of the arm, such as payload.mass=0.1,0.5; up to four: corners, and a search inside
     save: write the law to this TOML file, for --law
     """
     from tfarm.arm.writing import save_law
+    from tfarm.synthesis.requirements import load_requirements
 
     subject = load_arm(arm, theory)
-    found = tfarm.design(
-        subject,
-        objective,
-        structure=structure,
-        modes=modes,
-        chain=chain(arm),
-        continuous=continuous,
-        progress=partial(advance, 0, 0),
-        also=[load_arm(file, theory) for file in also or []],
-        ranges=dict(over or []),
-        **{RATE_GAIN: k1, MOMENT_GAIN: k2, ANGLE_GAIN: kp},
-    )
+    wanted = load_requirements(arm) if require is None else require
+    options: dict[str, Any] = {
+        "require": wanted,
+        "structure": structure,
+        "modes": modes,
+        "chain": chain(arm),
+        "progress": partial(advance, 0, 0),
+        "also": [load_arm(file, theory) for file in also or []],
+        RATE_GAIN: k1,
+        MOMENT_GAIN: k2,
+        ANGLE_GAIN: kp,
+    }
+    if trade_off:
+        refuse(
+            {"--range": over, "--continuous": continuous or None}, "the front is of given arms and both loops"
+        )
+        front = tfarm.trade_off(subject, objective, **options)
+        files = []
+        for n, each in enumerate(front.laws, 1):
+            if save is not None:
+                files.append(save.with_stem(f"{save.stem}-{n:02}"))
+                save_law(tfarm.Case(subject, each).law, files[-1])
+        show(front, also=files)
+        return
+    found = tfarm.design(subject, objective, continuous=continuous, ranges=dict(over or []), **options)
     if save is not None:
         save_law(tfarm.Case(subject, found.law).law, save)
     show(found, also=(save,))

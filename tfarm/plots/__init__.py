@@ -18,12 +18,14 @@ In the look of the report's pages, whose pictures these are.  This is the only r
 - `motion`: mode shapes, time responses, the gain tuner
 - `animation`: the arm in motion, a GIF
 - `studies`: distributions of a study
+- `fronts`: speed against robustness
 """
 
 from tfarm.moved import moved
 from tfarm.plots.animation import animate
 from tfarm.plots.arm_sketch import sketch
 from tfarm.plots.frequency import bode, measured_response
+from tfarm.plots.fronts import trade_off
 from tfarm.plots.loop_function import disc, loop, nichols, nyquist, sensitivity
 from tfarm.plots.motion import modes, slew, step, tuned_gain
 from tfarm.plots.regions import comparison, gain_map, gain_regions
@@ -52,6 +54,7 @@ __all__ = [
     "study",
     "study_band",
     "study_scatter",
+    "trade_off",
     "tuned_gain",
 ]
 

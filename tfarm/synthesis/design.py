@@ -4,7 +4,10 @@ A search within bounds by a judge of few modes is followed by exact verdicts, wh
 has the number of searches that agreed, the width of the optimum, and whether the bounds cut the search off.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from itertools import islice
 from operator import attrgetter, itemgetter
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -14,8 +17,10 @@ from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, must_turn
 from tfarm.arm.stages import Consumer
 from tfarm.case import Case
 from tfarm.dsp import Chain
+from tfarm.dsp.plant import arm_under_chain
 from tfarm.dsp.stages import admit
-from tfarm.errors import ConvergenceError, must_be_known, require
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import require as require_that
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.edges import most_modes
 from tfarm.loop.sampled_brief import SampledBrief, sampled_brief
@@ -23,10 +28,14 @@ from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import frozen
 from tfarm.schema import Quantity
-from tfarm.synthesis.judge import LOST, OBJECTIVES, Judge, judge_of, model_sizes
+from tfarm.synthesis.goals import Checked
+from tfarm.synthesis.judge import LOST, OBJECTIVES, TOO_SLOW, Judge, judge_of, model_sizes
 from tfarm.synthesis.models import slew_and_after, trial_slew
+from tfarm.synthesis.required import RequiredLaw, RequirementTask, Sensitivity, is_active, names_of
+from tfarm.synthesis.requirements import MEASURES, Wanted, measure_named, requirements_of
 from tfarm.synthesis.search import Search, Worst, flat_part, search
-from tfarm.synthesis.structures import Bounds, Structure, check_bounds, structure_of
+from tfarm.synthesis.structures import STRUCTURES, Bounds, Structure, check_bounds, structure_of
+from tfarm.synthesis.trade_off import TradeOff, front
 from tfarm.synthesis.worst_case import (
     ArmBox,
     Effort,
@@ -172,6 +181,36 @@ class Design:
         ),
     ]
     worst_case: WorstCase
+    requirements: Annotated[
+        tuple[Checked, ...], Quantity("requirements", help="requirements with exact values, on each arm")
+    ] = ()
+    conflicts: Annotated[
+        tuple[str, ...],
+        Quantity("conflicts", help="requirements without which the others are met, where not all are"),
+    ] = ()
+    alternatives: Annotated[
+        tuple[str, ...], Quantity("alternatives", help="structures whose best law meets all requirements")
+    ] = ()
+    sensitivities: Annotated[
+        tuple[Sensitivity, ...],
+        Quantity("sensitivities", help="changes of the required quantities, sampled loop, by the model"),
+    ] = ()
+
+    @property
+    def is_met(
+        self,
+    ) -> Annotated[bool, Quantity("requirements met", help="whether the exact loops meet all requirements")]:
+        """Whether the exact loops meet all requirements on all arms."""
+        return all(each.violation <= 0 for each in self.requirements)
+
+    @property
+    def active(
+        self,
+    ) -> Annotated[
+        list[str], Quantity("active requirements", help="requirements with less than 2 % of their limit left")
+    ]:
+        """The requirements that limit the law."""
+        return names_of(self.requirements, is_active)
 
     @property
     def rows(
@@ -244,8 +283,9 @@ class _Choice(NamedTuple):
 
 def design(
     arm: Arm,
-    objective: str = "damping",
+    objective: str | None = None,
     *,
+    require: Wanted | None = None,
     structure: str = TWO_GAINS,
     K1: Bounds | None = None,
     K2: Bounds | None = None,
@@ -259,11 +299,19 @@ def design(
 ) -> Design:
     """Return the law of a structure with the best value of an objective in the sampled loop of a chain (default 10 ms).
 
+    By default the law has the grade *good* in the result card of both loops, and the least settling time of the tip in
+    the slew, or the least time constant of an arm that cannot turn.  Quantities of `tfarm.synthesis.requirements` are
+    minimised under the requirements `require`, "good" by default, such as "GM>=6, PM>=45, torque<=5" or
+    {"phase_margin": 45}: the time constant decides where the tip is at rest when the motion ends.  Where no law meets
+    them all, that with the least violations is returned: `.is_met` says so, `.conflicts` and `.alternatives` what would
+    help.
+
     Structures are those of `tfarm.synthesis.structures`: "K1-K2", gains of rate and moment, within the bounds `K1` and
     `K2` where given, "PD", "PD+notch" and others; `modes` is the number of filters, `Kp` is chosen where it is 0, but
     of "K1-K2".
-    Objectives are "damping" of the first `modes` modes, "margin", "sensitivity", "delay", "residual" and "cost" (see
-    `objectives`).  The law is stable when sampled, with all gains a quarter larger or smaller, and in continuous time.
+    Objectives without requirements are "damping" of the first `modes` modes, "margin", "sensitivity", "delay",
+    "residual" and "cost", of laws with a dominant time constant of at most four periods of mode 1, or 50 samples.  The
+    law is stable when sampled, with all gains a quarter larger or smaller, and in continuous time.
     `continuous`: for the continuous-time loop instead; its best law may be unstable when sampled.
     `progress` is called with one line at a time.
 
@@ -273,27 +321,132 @@ def design(
     are those of the arm itself.  Raises ParameterError for options that exclude each other, ConvergenceError where no
     stable law is found.
     """
-    must_be_known("objective", objective, OBJECTIVES)
-    remedy = "the cost of the tuner's trial is one of samples: design for the sampled loop"
-    require(objective != "cost" or not continuous, "objective", objective, remedy)
-    if OBJECTIVES[objective].of_slew:
-        must_turn(arm)
+    is_plain = require is None and objective in OBJECTIVES
+    remedy = "requirements are of both loops: leave out the continuous-time loop"
+    require_that(is_plain or not continuous, "continuous", continuous, remedy)
     ends = {key: (float(low), float(high)) for key, (low, high) in (ranges or {}).items()}
     box = ArmBox(arm, ends) if ends else None
-    arms = arms_of(arm, also, box)
-    chain = Chain() if chain is None else chain
-    for each in arms:
-        admit(CONSUMER, each.arm, chain)
-    same_input(arms)
-    form = structure_of(
-        structure, arm, Kp=Kp, modes=modes, period=chain.sampling.period, bounds={"K1": K1, "K2": K2}
+    options = _Options(
+        arm, structure, {"K1": K1, "K2": K2}, Kp, modes, chain or Chain(), tuple(also), box, progress
     )
-    for each in arms:
-        ContinuousLoop(Case(each.arm, form.record_at(form.origin)))
-        check_bounds(form, each.arm)
-    tell = progress or (lambda text: None)
-    task = _DesignTask(arm, objective, form, modes, chain, continuous, tell)
-    return task.design(*for_the_worst(arms, box, task.find, task.score_on, tell))
+    if is_plain:
+        remedy = "the cost of the tuner's trial is one of samples: design for the sampled loop"
+        require_that(objective != "cost" or not continuous, "objective", objective, remedy)
+        if OBJECTIVES[str(objective)].of_slew:
+            must_turn(arm)
+        arms, form = options.arms_and_form(is_angle_free=False)
+        task = _DesignTask(arm, str(objective), form, modes, options.chain, continuous, options.tell)
+        return task.design(*for_the_worst(arms, box, task.find, task.score_on, options.tell))
+    search_for, arms = options.task(objective, require)
+    found, named, case = for_the_worst(arms, box, search_for.find, search_for.score_on, options.tell)
+    conflicts: tuple[str, ...] = ()
+    alternatives: tuple[str, ...] = ()
+    if found.violation > 0:
+        conflicts = search_for.conflicts(found, named)
+        others = (replace(search_for, form=each) for each in _other_forms(options))
+        alternatives = tuple(islice((each.form.name for each in others if each.meets(named)), 1))
+    return replace(
+        _record(search_for, found, named, case, is_continuous=False),
+        requirements=found.checked,
+        sensitivities=tuple(search_for.sensitivities(found)),
+        conflicts=conflicts,
+        alternatives=alternatives,
+    )
+
+
+def trade_off(
+    arm: Arm,
+    objective: str | None = None,
+    *,
+    require: Wanted | None = None,
+    structure: str = TWO_GAINS,
+    K1: Bounds | None = None,
+    K2: Bounds | None = None,
+    Kp: float = 0.0,
+    modes: int = 2,
+    chain: Chain | None = None,
+    progress: Tell | None = None,
+    also: Sequence[Arm] = (),
+) -> TradeOff:
+    """Return the front of speed against robustness: 12 designs, from 0.4 to 1.9 times the limits of the grade good.
+
+    Arguments are those of `design`; the dominant time constant is minimised unless another quantity is named.
+    Requirements of other quantities than gain, phase and delay margin and Ms hold at
+    every point.  Raises ParameterError as `design` does, ConvergenceError where no law is stable on all arms.
+    """
+    options = _Options(
+        arm, structure, {"K1": K1, "K2": K2}, Kp, modes, chain or Chain(), tuple(also), None, progress
+    )
+    return front(*options.task(objective or "time-constant", require))
+
+
+@frozen
+class _Options:
+    """The arms of a design, the structure with what is given of it, and its sampling."""
+
+    arm: Arm
+    structure: str
+    bounds: dict[str, Bounds | None]
+    Kp: float
+    modes: int
+    chain: Chain
+    also: tuple[Arm, ...]
+    box: ArmBox | None
+    progress: Tell | None
+
+    def tell(self, text: str) -> None:
+        """Pass a line of progress on."""
+        if self.progress is not None:
+            self.progress(text)
+
+    def form(self, structure: str, *, is_angle_free: bool) -> Structure:
+        """Return a structure with what is given of it, if it is the one named."""
+        is_own = structure == self.structure
+        return structure_of(
+            structure,
+            self.arm,
+            Kp=self.Kp if is_own else 0.0,
+            modes=self.modes,
+            period=self.chain.sampling.period,
+            bounds=self.bounds if is_own else {},
+            is_angle_free=is_angle_free,
+        )
+
+    def arms_and_form(self, *, is_angle_free: bool) -> tuple[list[NamedArm], Structure]:
+        """Return all arms, each with its name, and the structure.  Raises ParameterError for what does not fit."""
+        arms = arms_of(self.arm, self.also, self.box)
+        for each in arms:
+            admit(CONSUMER, each.arm, self.chain)
+        same_input(arms)
+        form = self.form(self.structure, is_angle_free=is_angle_free)
+        for each in arms:
+            ContinuousLoop(Case(each.arm, form.record_at(form.origin)))
+            check_bounds(form, each.arm)
+        return arms, form
+
+    def task(self, objective: str | None, wanted: Wanted | None) -> tuple[RequirementTask, list[NamedArm]]:
+        """Return the search for a law that meets requirements, and its arms."""
+        if objective is None:
+            # an arm that cannot turn has no slew
+            objective = "settling" if self.arm.has_rigid_mode else "time-constant"
+        minimised = measure_named(objective, "objective")
+        limits = requirements_of("good" if wanted is None else wanted)
+        if MEASURES[minimised].of_slew or any(each.measure.of_slew for each in limits):
+            must_turn(self.arm)
+        arms, form = self.arms_and_form(is_angle_free=True)
+        return RequirementTask(self.arm, limits, minimised, form, self.modes, self.chain, self.tell), arms
+
+
+def _other_forms(options: _Options) -> Iterator[Structure]:
+    """Yield the other structures of an arm, those of few coefficients first."""
+    forms = []
+    for name in STRUCTURES:
+        if name != options.structure:
+            with suppress(ParameterError):
+                forms.append(options.form(name, is_angle_free=True))
+    # a search among more takes more than a minute
+    most_coefficients = 6
+    yield from sorted((each for each in forms if each.size <= most_coefficients), key=attrgetter("size"))
 
 
 @frozen
@@ -333,6 +486,7 @@ class _DesignTask:
         nearest: tuple[float, Any] = (np.inf, None)
         sizes = [self.sizes(each.arm) for each in named]
         near = None if before is None else before.x
+        least_lost = TOO_SLOW if OBJECTIVES[self.objective].needs_speed else LOST
         for step in range(max(map(len, sizes))):
             several = tuple(
                 self.judge(each.arm, own[min(step, len(own) - 1)])
@@ -344,7 +498,9 @@ class _DesignTask:
             nearest = min(nearest, found.found[0], key=itemgetter(0))
             for score, x in found.found:
                 law = found.form.record_at(x)
-                if effort == "sketch" or (score < LOST and all(judge.is_stable(law) for judge in several)):
+                if effort == "sketch" or (
+                    score < least_lost and all(judge.is_stable(law) for judge in several)
+                ):
                     return _Choice(Worst(several), found, score, x, law)
         score, x = nearest
         law = self.form.record_at(x)
@@ -361,37 +517,52 @@ class _DesignTask:
 
     def design(self, choice: _Choice, named: Sequence[NamedArm], case: WorstCase) -> Design:
         """Return the record of a law for these arms."""
-        law = choice.law
-        x = choice.x
-        own = choice.search.form
-        on_arms = []
-        for (name, _, numbers), judge in zip(named, choice.worst.judges, strict=True):
-            on_arm = judge.case(law)
-            value = judge.value(law)
-            on_arms.append(OnArm(name, numbers, value, stability(on_arm), sampled_brief(on_arm)))
-        at_ends = own.at_ends(x)
-        physical = own.ends(physical=True)
-        return Design(
-            objective=self.objective,
-            structure=own.name,
-            law=law,
-            coefficients=own.by_name(own.coefficients(x).tolist()),
-            value=OBJECTIVES[self.objective].worst([each.value for each in on_arms]),
-            verdict=on_arms[0].verdict,
-            bounds={each.name: each.bounds for each in own.free},
-            flat=flat_part(choice.worst, own, x, choice.score),
-            modes=self.modes,
-            at_bound=tuple(own.names[place] for place, _ in at_ends),
-            at_limit=tuple(own.names[place] for place, end in at_ends if (place, end) in physical),
-            widened=choice.search.widened,
-            loop="continuous" if self.continuous else "sampled",
-            chain=self.chain,
-            sampled=on_arms[0].sampled,
-            arms=tuple(on_arms),
-            starts=choice.search.starts,
-            agreed=choice.search.agreed,
-            worst_case=case,
-        )
+        return _record(self, choice, named, case, is_continuous=self.continuous)
+
+
+def _record(
+    task: _DesignTask | RequirementTask,
+    choice: _Choice | RequiredLaw,
+    named: Sequence[NamedArm],
+    case: WorstCase,
+    *,
+    is_continuous: bool,
+) -> Design:
+    """Return the record of a law for these arms."""
+    law = choice.law
+    x = choice.x
+    own = choice.search.form
+    objective = choice.worst.judges[0].objective
+    on_arms = []
+    for (name, arm, numbers), judge in zip(named, choice.worst.judges, strict=True):
+        # of an arm without damping the judge has that with which its card is graded
+        own_arm, chain = arm_under_chain(arm, task.chain)
+        on_arm = Case(own_arm, law, chain)
+        value = judge.value(law)
+        on_arms.append(OnArm(name, numbers, value, stability(on_arm), sampled_brief(on_arm)))
+    at_ends = own.at_ends(x)
+    physical = own.ends(physical=True)
+    return Design(
+        objective=task.objective,
+        structure=own.name,
+        law=law,
+        coefficients=own.by_name(own.coefficients(x).tolist()),
+        value=objective.worst([each.value for each in on_arms]),
+        verdict=on_arms[0].verdict,
+        bounds={each.name: each.bounds for each in own.free},
+        flat=flat_part(choice.worst, own, x, objective.within_one_per_cent(choice.score)),
+        modes=task.modes,
+        at_bound=tuple(own.names[place] for place, _ in at_ends),
+        at_limit=tuple(own.names[place] for place, end in at_ends if (place, end) in physical),
+        widened=choice.search.widened,
+        loop="continuous" if is_continuous else "sampled",
+        chain=task.chain,
+        sampled=on_arms[0].sampled,
+        arms=tuple(on_arms),
+        starts=choice.search.starts,
+        agreed=choice.search.agreed,
+        worst_case=case,
+    )
 
 
 def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Chain | None, size: int) -> str:

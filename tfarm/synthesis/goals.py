@@ -4,8 +4,8 @@
    violations: an exact penalty (Fletcher, Practical Methods of Optimization, 1987, sec. 12.3), whose minimum lies on
    the limits where the weight w is above the multipliers.
 2. A simplex of Nelder and Mead minimises quantities of the slew, which is simulated with its converters.
-3. The result card of the exact loops has the last word.  What it has less than the model tightens the requirement on the
-   model, and the search goes on from there.
+3. The result card of the exact loops has the last word.  What it has less than the model tightens the requirement
+   on the model, and the search goes on from there.
 """
 
 from __future__ import annotations
@@ -53,6 +53,7 @@ class Goal:
     is_negated = False
     of_slew = False
     of_poles = True
+    needs_speed = False
 
     @property
     def by_simulation(self) -> bool:
@@ -130,6 +131,16 @@ class Goal:
                 score += WEIGHT * max(each.violation(figures[each.name]) + shift, 0.0)
         return score
 
+    @staticmethod
+    def worst(values: Sequence[float]) -> float:
+        """Return the worst of its values."""
+        return max(values)
+
+    @staticmethod
+    def within_one_per_cent(score: float) -> float:
+        """Return the score of a value one per cent larger."""
+        return score + 0.01
+
     def value(self, judge: Any, law: AnyLaw) -> float:
         """Return the quantity of a law, by the best available method."""
         return exact_values(judge.case(law), slew_of(judge)).sampled[self.minimised]
@@ -139,8 +150,8 @@ def _is_of_slew(name: str) -> bool:
     return Requirement(name, "<=", 1.0).measure.of_slew
 
 
-def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real) -> tuple[float, Real]:
-    """Return the score and the point of a simplex that begins at x, with the slew simulated on every arm."""
+def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real) -> Real:
+    """Return the point of a simplex that begins at x, with the slew simulated on every arm."""
     slews = [slew_of(judge) for judge in judges]
 
     def score(at: Real) -> float:
@@ -153,7 +164,7 @@ def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real) -> tuple[flo
     done = cast("Any", minimize)(
         score, x, method="Nelder-Mead", bounds=np.transpose(form.box), options=options
     )
-    return float(done.fun), np.asarray(done.x)
+    return np.asarray(done.x)
 
 
 def slew_of(judge: Any) -> SlewMeasures:

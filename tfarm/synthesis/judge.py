@@ -36,6 +36,7 @@ from tfarm.loop.loop_margins import lowest
 from tfarm.loop.sampled_verdict import UNDAMPED_MODES, sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.records import frozen
+from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.models import DesignModel, Slews, continuous_model, sampled_model, slew_and_after
 from tfarm.synthesis.structures import Entry, polynomial_of
 
@@ -43,6 +44,8 @@ from tfarm.synthesis.structures import Entry, polynomial_of
 RESERVE = 1.25
 # score where a loop is unstable, and as much for each later condition: above any value in SI units
 LOST = 1e30
+# score where a law is slower than allowed: above the value of every objective with that condition
+TOO_SLOW = 1e6
 
 
 def damping_of(model: DesignModel, poles: Complex) -> Real:
@@ -61,6 +64,31 @@ def damping_of(model: DesignModel, poles: Complex) -> Real:
     # at a smaller angle [rad], of ln z or s, a pole is real
     counted &= (np.angle(poles) > 1e-9) & (poles != 0) & (s.imag < model.band)
     return np.where(counted, -s.real / np.maximum(abs(s), LEAST_SIZE), 1.0).min(axis=1, initial=1.0)
+
+
+def dominant_time_constant(model: DesignModel, poles: Complex, first: float) -> Real:
+    """Return the time constant [s] (laws,) of the slowest pole below twice the `first` frequency [rad/s].
+
+    Modes above ring on at their own small damping, which no law of few coefficients changes.  Where no pole is below,
+    the nearest to 0 counts.
+    """
+    s = model.in_s(poles) / (model.period or 1.0)
+    counted = np.ones(s.shape, dtype=bool)
+    rows = np.arange(len(s))
+    for own in model.higher:
+        # of sampled modes that alias to lower frequencies
+        gap = np.where(counted & (poles.imag >= 0), abs(poles - own), np.inf)
+        counted[rows, gap.argmin(axis=1)] = False
+    counted &= (s.imag >= 0) & (poles != 0)
+    size = np.where(counted, abs(s), np.inf)
+    reach = np.maximum(2.0 * first, size.min(axis=1, keepdims=True))
+    rate = np.where(size <= reach, -s.real, np.inf).min(axis=1)
+    return 1 / np.maximum(rate, LEAST_SIZE)
+
+
+def slowest_allowed(arm: Arm, period: float) -> float:
+    """Return the longest dominant time constant [s] of a law: four periods of mode 1, or 50 samples."""
+    return max(4 * 2 * np.pi / first_frequency(arm), 50 * period)
 
 
 def disk_of(L: Complex) -> Real:
@@ -102,7 +130,8 @@ class Objective(NamedTuple):
     """Its `scores` (laws,), small where laws are good, and the `value` of one law by a judge.
 
     Scores are of a judge, the entries of laws, and if `of_poles` of their poles (laws, n) in its model.  `is_negated`:
-    whether the value is the negated score; `of_slew`: whether it is of a slew.
+    whether the value is the negated score; `of_slew`: whether it is of a slew; `needs_speed`: whether it is best
+    without a controller, so that only laws count that are as fast as `slowest_allowed`.
     """
 
     scores: Callable[[Any, Sequence[Entry], Any], Real]
@@ -110,6 +139,11 @@ class Objective(NamedTuple):
     is_negated: bool = False
     of_slew: bool = False
     of_poles: bool = False
+    needs_speed: bool = False
+
+    def within_one_per_cent(self, score: float) -> float:
+        """Return the score of a value one per cent worse."""
+        return score + 0.01 * abs(score)
 
     def worst(self, values: Sequence[float]) -> float:
         """Return the worst of its values."""
@@ -187,6 +221,10 @@ class Judge:
         stable = growth < 0
         if stable.any():
             scores[stable] = self.objective.scores(self, of_laws(entries, stable), poles[stable])
+            if self.objective.needs_speed:
+                slow = dominant_time_constant(self.model, poles[stable], first_frequency(self.arm))
+                excess = slow / slowest_allowed(self.arm, self.chain.sampling.period)
+                scores[stable] += np.where(excess > 1, TOO_SLOW * excess, 0.0)
         return scores
 
     # ------------------------------------------------------------ beyond it
@@ -264,12 +302,14 @@ OBJECTIVES = {
         is_negated=True,
         of_poles=True,
     ),
-    "margin": Objective(disk_score, Judge.disk_margin, is_negated=True, of_poles=True),
+    "margin": Objective(disk_score, Judge.disk_margin, is_negated=True, of_poles=True, needs_speed=True),
     "sensitivity": Objective(
         lambda judge, entries, _: judge.peak(abs(1 + judge.model.loop(entries)).min(axis=1)),
         Judge.peak_sensitivity,
+        of_poles=True,
+        needs_speed=True,
     ),
-    "delay": Objective(delay_score, Judge.delay_margin, is_negated=True, of_poles=True),
+    "delay": Objective(delay_score, Judge.delay_margin, is_negated=True, of_poles=True, needs_speed=True),
     "residual": Objective(
         lambda judge, entries, _: judge.slews.residual(entries), Judge.simulated_residual, of_slew=True
     ),

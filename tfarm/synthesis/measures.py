@@ -13,7 +13,7 @@ import numpy as np
 
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.records import frozen
-from tfarm.synthesis.judge import damping_of, delay
+from tfarm.synthesis.judge import damping_of, delay, dominant_time_constant
 from tfarm.synthesis.models import DesignModel
 from tfarm.synthesis.structures import Entry
 
@@ -81,23 +81,8 @@ class LoopMeasures:
         return 1 / np.maximum(rate, LEAST_SIZE)
 
     def dominant_time_constant(self, first: float) -> Real:
-        """Return the time constant [s] of the slowest pole below twice the `first` frequency [rad/s] (laws,).
-
-        Modes above ring on at their own small damping, which no law of few coefficients changes; where no pole is
-        below, the nearest to 0 counts.
-        """
-        s = self.model.in_s(self.poles) / (self.model.period or 1.0)
-        counted = np.ones(s.shape, dtype=bool)
-        rows = np.arange(len(s))
-        for own in self.model.higher:
-            # of sampled modes that alias to lower frequencies
-            gap = np.where(counted & (self.poles.imag >= 0), abs(self.poles - own), np.inf)
-            counted[rows, gap.argmin(axis=1)] = False
-        counted &= (s.imag >= 0) & (self.poles != 0)
-        size = np.where(counted, abs(s), np.inf)
-        reach = np.maximum(2.0 * first, size.min(axis=1, keepdims=True))
-        rate = np.where(size <= reach, -s.real, np.inf).min(axis=1)
-        return 1 / np.maximum(rate, LEAST_SIZE)
+        """Return the time constant [s] of the slowest pole below twice the `first` frequency [rad/s] (laws,)."""
+        return dominant_time_constant(self.model, self.poles, first)
 
     def of(self, name: str) -> Real:
         """Return the measure of that name (laws,)."""

@@ -8,6 +8,7 @@ without which the others are met.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
@@ -24,7 +25,7 @@ from tfarm.synthesis.goals import Checked, Goal, check, polished
 from tfarm.synthesis.judge import LOST, Judge, judge_of, model_sizes
 from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.models import sampled_model
-from tfarm.synthesis.requirements import Requirement
+from tfarm.synthesis.requirements import MEASURES, Requirement
 from tfarm.synthesis.search import Search, Worst, search
 from tfarm.synthesis.structures import Structure
 from tfarm.synthesis.worst_case import Effort, NamedArm, Tell
@@ -126,7 +127,8 @@ class RequirementTask:
             if score >= LOST:
                 break
             if goal.by_simulation and effort != "sketch":
-                score, x = polished(goal, judges, form, x)
+                x = polished(goal, judges, form, x)
+                score = float(Worst(judges).scores(form, x[:, None])[0])
             law = form.record_at(x)
             if effort == "sketch":
                 return RequiredLaw(Worst(judges), found, score, x, law, goal, ())
@@ -155,6 +157,17 @@ class RequirementTask:
             nearest = None if best is None else best.law
             raise ConvergenceError("no law of the structure is stable on all arms", nearest, None)
         return best
+
+    @property
+    def objective(self) -> str:
+        """The quantity that is minimised, as it is written."""
+        return MEASURES[self.minimised].short[0]
+
+    def meets(self, named: Sequence[NamedArm]) -> bool:
+        """Return whether a law of the structure meets all requirements on all arms."""
+        with suppress(ConvergenceError):
+            return self.find(named, None, "near").violation <= 0
+        return False
 
     def score_on(self, choice: RequiredLaw, on: Arm) -> float:
         """Return the score of a law on another arm; inf where the loop is unstable."""

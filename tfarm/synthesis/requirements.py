@@ -17,8 +17,9 @@ from typing import Annotated, Literal, NamedTuple, cast
 
 import numpy as np
 
+from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arrays import Real
-from tfarm.errors import ParameterError, must_be_known, require
+from tfarm.errors import ParameterError, must_be_known, name_file, require
 from tfarm.schema import Quantity
 
 Sense = Literal[">=", "<="]
@@ -99,9 +100,11 @@ def measure_named(word: str, key: str) -> str:
     return _NAMES[word]
 
 
-def requirements_of(
-    wanted: str | Mapping[str, float | str] | Sequence[Requirement],
-) -> tuple[Requirement, ...]:
+# a list in a text, a limit for each name, or requirements
+Wanted = str | Mapping[str, float | str] | Sequence[Requirement]
+
+
+def requirements_of(wanted: Wanted) -> tuple[Requirement, ...]:
     """Return the requirements of a text, a table, or a sequence of them.
 
     A text is a list such as "GM>=6, PM>=45, damping>=2%"; "good" stands for the limits of the grade.  A table has a
@@ -120,6 +123,23 @@ def requirements_of(
         found = list(wanted)
     last = {each.name: each for each in found}
     return tuple(last.values())
+
+
+def load_requirements(name_or_path: AnyFile) -> tuple[Requirement, ...] | None:
+    """Return the requirements of a file's table [requirements], a limit for each name; None where it has none.
+
+    Raises ParameterError, naming the file, for what `requirements_of` refuses.
+    """
+    tables, file = load_tables(name_or_path)
+    if "requirements" not in tables:
+        return None
+    table = tables["requirements"]
+    with name_file(file):
+        require(isinstance(table, dict), "requirements", table, "give a table, headed [requirements]")
+        for key, value in table.items():
+            is_number = isinstance(value, int | float) and not isinstance(value, bool)
+            require(is_number, f"requirements.{key}", value, "a number, such as PM = 45 or damping = 0.02")
+        return requirements_of(table)
 
 
 def _of_text(text: str) -> Requirement:

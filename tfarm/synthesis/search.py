@@ -253,13 +253,12 @@ def _best_points(form: Structure, x: Real, scores: Real) -> list[tuple[float, Re
     return found
 
 
-def flat_part(judge: Worst, form: Structure, x: Real, score: float) -> dict[str, Bounds]:
-    """Return the range of each coefficient with a score within one per cent of the best, the others constant.
+def flat_part(judge: Worst, form: Structure, x: Real, limit: float) -> dict[str, Bounds]:
+    """Return the range of each coefficient with a score up to a limit above that of the best, the others constant.
 
     The search goes outwards in growing steps, then by halving: narrow ranges are found as well as wide ones.
     """
     n = form.size
-    limit = score + 0.01 * abs(score)
     ways = np.concatenate([np.diag(end - x) for end in form.box]).T
 
     def is_within(shares: Real) -> Any:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import attrgetter
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -61,7 +62,7 @@ def scaled_limits(robustness: float) -> tuple[Requirement, ...]:
     )
 
 
-def trade_off(task: RequirementTask, named: Sequence[NamedArm], number: int = 12) -> TradeOff:
+def front(task: RequirementTask, named: Sequence[NamedArm], number: int = 12) -> TradeOff:
     """Return the front of a task, whose own requirements of other quantities hold at every point.
 
     Raises ConvergenceError where no law is stable on all arms.
@@ -77,6 +78,10 @@ def trade_off(task: RequirementTask, named: Sequence[NamedArm], number: int = 12
         start = None if before is None else before._replace(goal=own.goal)
         try:
             found = own.find(named, start, "whole" if before is None else "near")
+            if found.violation > 0 and before is not None:
+                # the optimum has jumped to another part of the plane
+                other = own.find(named, None, "whole")
+                found = min(found, other, key=attrgetter("violation"))
         except ConvergenceError:
             if before is None:
                 raise
