@@ -14,7 +14,7 @@ from contextlib import nullcontext, suppress
 from dataclasses import fields, replace
 from functools import cached_property, partial
 from importlib import import_module
-from itertools import islice
+from itertools import islice, repeat
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -146,6 +146,12 @@ class Space:
     def is_independent(self) -> bool:
         """Whether the rows are independent draws: confidence needs that."""
         return bool(self.drawn_keys) and not (self.grids or self.listing)
+
+    def some_rows(self, numbers: Sequence[int]) -> Real:
+        """Return the rows (numbers, keys) of these numbers, which ascend; of independent draws any."""
+        ends = [(n, n + 1) for n in numbers]
+        blocks = repeat(None) if self.listing is None else self.listing.blocks(ends)
+        return np.vstack([self.rows(*end, block) for end, block in zip(ends, blocks, strict=False)])
 
     def rows(self, first: int, last: int, listed: Real | None) -> Real:
         """Return rows first to last - 1 (rows, keys); `listed` are those of the list behind them."""
@@ -292,6 +298,23 @@ class Subjects:
             chain = replace(chain, **{table: replace(getattr(chain, table), **{name: values[key]})})
         tuner = {name: values[key] for key, name in self._of_tuner.items()}
         return Subject(Case(arm, law, chain), tuner)
+
+    def all_of(self, rows: Real, numbers: Sequence[int]) -> list[Subject]:
+        """Return the cases of rows of these numbers.
+
+        Raises ParameterError with the count of illegal ones, and the number and reason of the first.
+        """
+        found = []
+        errors = dict[int, ParameterError]()
+        for n, row in zip(numbers, rows.tolist(), strict=True):
+            try:
+                found.append(self.at(row))
+            except ParameterError as error:
+                errors[n] = error
+        for n, first in errors.items():
+            remedy = f"{len(errors)} of {len(rows)} arms are illegal, the first in row {n}: {first.remedy}"
+            raise ParameterError(key=first.key, value=first.value, remedy=remedy)
+        return found
 
 
 # ------------------------------------------------------------------------------------------------------------ lists

@@ -341,7 +341,7 @@ def run_parts(
     count = min(CHECKED, plan.space.count)
     listing = plan.space.listing
     rows = plan.space.rows(0, count, None if listing is None else next(listing.blocks([(0, count)])))
-    check_rows(plan, rows)
+    plan.subjects.all_of(rows, range(count))
     parts = open_study(folder, plan, files, resources.workers, size, rows)
 
     def calls(ends: Sequence[tuple[int, int]]) -> Iterator[Callable[[], Chunk]]:
@@ -400,21 +400,6 @@ def search_rows(
     except TimeoutError:
         return None
     return seen
-
-
-def check_rows(plan: StudyPlan, rows: Real) -> None:
-    """Raise ParameterError where some of the first rows are illegal, with their number and the first reason."""
-    # which refuse an unknown key, before any row
-    subjects = plan.subjects
-    errors = dict[int, ParameterError]()
-    for number, row in enumerate(rows.tolist()):
-        try:
-            subjects.at(row)
-        except ParameterError as error:
-            errors[number] = error
-    for number, first in errors.items():
-        remedy = f"{len(errors)} of {len(rows)} arms are illegal, the first in row {number}: {first.remedy}"
-        raise ParameterError(key=first.key, value=first.value, remedy=remedy)
 
 
 # ------------------------------------------------------------------------------------------------------------ cluster

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Annotated, Any, NamedTuple, cast
 
@@ -43,12 +44,14 @@ SHARE_OF_SPEED = 0.05
 class Goal:
     """The least value of a quantity under requirements, as an objective of a judge.
 
-    `shifts` tighten each requirement of the sampled (0) and of the continuous-time loop (1) on the model.
+    `shifts` tighten each requirement of the sampled (0) and of the continuous-time loop (1) on the model.  A violation
+    counts by the `weight`.
     """
 
     requirements: tuple[Requirement, ...]
     minimised: str
     shifts: tuple[tuple[float, ...], tuple[float, ...]]
+    weight: float = WEIGHT
 
     is_negated = False
     of_slew = False
@@ -64,7 +67,7 @@ class Goal:
     def tighter(self, shifts: Real) -> Goal:
         """Return the goal with more (2, requirements) of each shift."""
         more = np.array(self.shifts) + shifts
-        return Goal(self.requirements, self.minimised, (tuple(more[0].tolist()), tuple(more[1].tolist())))
+        return replace(self, shifts=(tuple(more[0].tolist()), tuple(more[1].tolist())))
 
     def scores(self, judge: Any, entries: Sequence[Entry], poles: Any) -> Real:
         """Return the scores of laws that are stable on the model (laws,)."""
@@ -93,17 +96,17 @@ class Goal:
                     # the crossovers of L leave out how a late input changes what is read; these models have the shift
                     growth = [of.growth(of.poles(sampled.entries)).max(axis=1) for of in judge.delayed]
                     violation = np.maximum(violation, np.max(growth, axis=0) / GROWTH_OF_DELAY)
-                total += WEIGHT * np.maximum(violation, 0.0)
+                total += self.weight * np.maximum(violation, 0.0)
         return total
 
     def excess(self, judges: Sequence[Any], law: AnyLaw) -> float:
         """Return the sum of violations of a law on the models, the largest of the arms, without shifts."""
-        plain = Goal(self.requirements, self.minimised, (self.none, self.none))
+        plain = replace(self, shifts=(self.none, self.none))
         found = []
         for judge in judges:
             entries = judge.entries(law)
             loop = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
-            found.append(float(plain._penalty(judge, loop)[0]) / WEIGHT)
+            found.append(float(plain._penalty(judge, loop)[0]) / self.weight)
         return max(found)
 
     @property
@@ -128,7 +131,7 @@ class Goal:
             score += float(np.log(max(float(measures.of(self.minimised)[0]), LEAST_SIZE)))
         for each, shift in zip(self.requirements, self.shifts[0], strict=True):
             if each.measure.of_slew:
-                score += WEIGHT * max(each.violation(figures[each.name]) + shift, 0.0)
+                score += self.weight * max(each.violation(figures[each.name]) + shift, 0.0)
         return score
 
     @staticmethod

@@ -21,7 +21,7 @@ from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
 from tfarm.records import frozen
 from tfarm.schema import Quantity
-from tfarm.synthesis.goals import Checked, Goal, check, polished
+from tfarm.synthesis.goals import WEIGHT, Checked, Goal, check, polished
 from tfarm.synthesis.judge import LOST, Judge, judge_of, model_sizes
 from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.models import sampled_model
@@ -141,8 +141,15 @@ class RequirementTask:
             chosen = RequiredLaw(Worst(judges), found, score, x, law, goal, tuple(rows))
             if best is None or chosen.violation < best.violation:
                 best = chosen
-            if chosen.violation <= 0 or goal.excess(judges, law) > MET:
+            if chosen.violation <= 0:
                 break
+            if goal.excess(judges, law) > MET:
+                # the weight is below the multipliers, or no law meets the requirements
+                if goal.weight > WEIGHT:
+                    break
+                near = x
+                goal = replace(goal, weight=10 * WEIGHT)
+                continue
             if not np.isfinite(violations).all():
                 # unstable by a mode that the models leave out
                 if step + 1 >= max(
