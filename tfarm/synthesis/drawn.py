@@ -77,7 +77,7 @@ class Verification:
         self,
     ) -> Annotated[
         str,
-        Quantity("fresh arms", key="in_words", help="share with its confidence, one-sided, Clopper-Pearson"),
+        Quantity("finding", key="in_words", help="share with its confidence, one-sided, Clopper-Pearson"),
     ]:
         """The share of the fresh arms that meet the requirements, with its confidence."""
         text = f"requirements met on {self.met} of {self.arms} arms"
