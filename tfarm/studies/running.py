@@ -14,7 +14,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from itertools import islice, takewhile
 from logging import getLogger
 from pathlib import Path
@@ -84,16 +84,19 @@ class StudyPlan:
         """Names of the columns of texts."""
         return {FAILED, *(name for name in self.names if not quantity_of(name).is_number)}
 
-    @cached_property
+    @property
     def sources(self) -> list[tuple[Set[str], Values]]:
-        """The functions of the columns that are asked for."""
-        return sources_of(self.names)
+        """The functions of the columns that are asked for; not kept in the plan, as no process can be sent them."""
+        return _kept_sources(self.names)
 
     @cached_property
     def subjects(self) -> Subjects:
         """The arms and loops of the rows."""
         fitted = self.space.posterior.keys if self.space.posterior else ()
         return Subjects(self.case, self.space.keys, fitted)
+
+
+_kept_sources = cache(sources_of)
 
 
 def chunk(plan: StudyPlan, first: int, last: int, listed: Real | None = None) -> Chunk:
