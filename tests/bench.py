@@ -30,6 +30,7 @@ from tests.plausible.arms import draw
 from tfarm.arm import Arm, HubFeedback
 from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, Simulator, scenario
+from tfarm.ensemble.space import space_of
 from tfarm.exact.appendix import Appendix
 from tfarm.exact.outputs import output
 from tfarm.loop.circle_crossings import sampled_map
@@ -42,7 +43,6 @@ from tfarm.schema import to_dict
 from tfarm.spectrum.proofs import enclose_zero
 from tfarm.studies.quantities import column_names, values_of
 from tfarm.studies.running import StudyPlan, chunk
-from tfarm.studies.space import space_of
 from tfarm.tuner import Guard, Learning, initial_network, slew_trial, train
 
 PACKAGES = ("tfarm", "numpy", "numba", "scipy", "mpmath", "python-flint", "control")

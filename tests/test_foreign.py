@@ -14,9 +14,9 @@ import scipy.io
 from tests.cli.stops import members
 from tests.shared import refusal
 from tests.shell import heard, refused
+from tfarm.ensemble.space import listing_of
 from tfarm.fitting.data import read_measured
 from tfarm.fitting.recording import read_recording
-from tfarm.studies.space import listing_of
 
 DATA = Path(__file__).parent / "data" / "reproductions"
 READER = """

@@ -19,6 +19,7 @@ from tests.fitting.test_fit import LAB, PAIRS, measured
 from tests.shared import refusal, sized, thinned
 from tests.shell import refused, run
 from tfarm.dsp import Chain
+from tfarm.ensemble.declaration import load_study
 from tfarm.errors import ParameterError
 from tfarm.fitting.fit import arms_drawn, fit, response_band, save_fit, stable_share
 from tfarm.fitting.posterior import Posterior, PosteriorNumber, load_posterior, repeats
@@ -26,7 +27,6 @@ from tfarm.plots.frequency import draw_band, draw_share
 from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import fit_section
 from tfarm.spectrum.gains import default_gains
-from tfarm.studies.declaration import load_study
 
 MASS, OFFSET, E, I = "payload.mass", "payload.offset", "link.youngs_modulus", "link.section.second_moment"
 COVARIANCE = [[0.04, -0.018], [-0.018, 0.01]]  # of ln mass, and of offset/0.05: correlation -0.9

@@ -15,15 +15,16 @@ from tfarm.arm.chain import load_chain
 from tfarm.arm.law_tables import load_law
 from tfarm.case import Case
 from tfarm.dsp import Chain
+from tfarm.ensemble.confidence import least_share
+from tfarm.ensemble.space import Subject, Subjects, space_of
 from tfarm.errors import ParameterError
 from tfarm.spectrum.gains import default_gains
 from tfarm.studies import quantities as room
 from tfarm.studies import running
 from tfarm.studies.candidates import learning_curves
-from tfarm.studies.findings import failures_of, least_share, shares_of, spreads_of
+from tfarm.studies.findings import failures_of, shares_of, spreads_of
 from tfarm.studies.quantities import COLUMNS, column_names, order_of, sources_of, values_of
 from tfarm.studies.running import StudyPlan, chunk
-from tfarm.studies.space import Subject, Subjects, space_of
 from tfarm.studies.worst import badness
 from tfarm.tuner import tune
 from tfarm.tuner.tuning import usual_plan

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import pickle
 import resource
 import signal
 import sys
@@ -15,12 +16,12 @@ import tfarm
 from tests.shared import refusal, sized
 from tests.studies import kills
 from tfarm.dsp import Chain
+from tfarm.ensemble.declaration import load_study
+from tfarm.ensemble.space import extra
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.files import locked_folder
 from tfarm.studies import running
-from tfarm.studies.declaration import load_study
-from tfarm.studies.running import rows_a_chunk
-from tfarm.studies.space import extra
+from tfarm.studies.running import chunk, rows_a_chunk
 
 LAB = tfarm.load("sasaki2012-lab")
 STUDY = partial(tfarm.study, LAB, kills.OVER, ("modes",), None, Chain())
@@ -71,6 +72,13 @@ def test_kills_of_a_cluster_lose_one_chunk_a_worker_at_most(whole, tmp_path):
     assert kept.items() <= whole.items()
     assert STUDY(out=tmp_path, draws=kills.DRAWS, workers=1).is_complete
     assert kills.parts(tmp_path) == whole
+
+
+def test_a_plan_whose_rows_were_measured_here_reaches_another_process(tmp_path):
+    """Before a study is shared its first arms are computed by this process, for the size of a part."""
+    plan = STUDY(out=tmp_path / "s", draws=4, workers=1).parts.plan
+    here = chunk(plan, 0, 2)
+    assert chunk(pickle.loads(pickle.dumps(plan)), 0, 2) == here
 
 
 @pytest.mark.parametrize("workers", sized(1, 2))

@@ -13,7 +13,7 @@ from tfarm.arm import Hub
 from tfarm.synthesis import worst_case
 from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import RESERVE
-from tfarm.synthesis.worst_case import ArmBox, arms_of, for_the_worst, vary_arm, worst_inside
+from tfarm.synthesis.worst_case import ArmBox, arms_of, for_the_worst, vary_arm
 
 LAB, T = tfarm.load("sasaki2012-lab"), 0.01
 SHORT = replace(LAB, link=replace(LAB.link, length=0.8 * LAB.length), name="short")
@@ -81,7 +81,7 @@ def test_a_worst_arm_in_the_middle_of_a_box_is_found():
     def badness(arm):
         return -(((arm.payload.mass - 0.37) / 1.0) ** 2) - (np.log10(arm.hub.friction / 0.08) / 2) ** 2
 
-    worst, score, tried = worst_inside(box, badness)
+    worst, score, tried = box.worst(badness)
     assert worst.arm.payload.mass == pytest.approx(0.37, abs=0.1)
     assert worst.arm.hub.friction == pytest.approx(0.08, rel=0.6)
     assert score == badness(worst.arm) > max(badness(each.arm) for each in box.corners)

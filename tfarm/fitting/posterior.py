@@ -88,7 +88,7 @@ class Posterior(StrictTable):
                 False,
                 "posterior",
                 key,
-                f"the data do not determine it: give a range of its own, --over {key}=uniform:LOW,HIGH",
+                f"the data do not determine it: give a study a range of it, --over {key}=uniform:LOW,HIGH",
             )
 
     def draws(self, ranged: Mapping[str, Real], normal: Real) -> Real:

@@ -19,6 +19,7 @@ from tfarm.arm.checks import whole
 from tfarm.arrays import Real
 from tfarm.case import Case
 from tfarm.dsp import Chain, Simulation, results, traces
+from tfarm.ensemble.space import Subjects
 from tfarm.errors import require
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -26,7 +27,6 @@ from tfarm.spectrum import modes
 from tfarm.spectrum.gains import default_gains
 from tfarm.stopping import Progress
 from tfarm.studies.quantities import FREQUENCY, INTERVAL, STABILITY, intervals_of, prepare
-from tfarm.studies.space import Subjects
 from tfarm.tuner import LearningCurves, Tuning, compare_controllers, tried_loops, tune
 from tfarm.tuner.baselines import Outcomes, quantised_chain
 from tfarm.tuner.tuning import tune_by_default, usual_plan

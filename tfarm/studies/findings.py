@@ -1,11 +1,8 @@
 """Findings over the arms of a study: stable shares, distributions with their drivers, failures, and response bands.
 
-With k of n independent draws stable, at least the share p is stable with the confidence 1 - a, where k or more of n
-have the probability a at p: the one-sided interval of Clopper and Pearson (Biometrika 26, 1934).  An arm without a
-result counts as not stable.
+The confidence of a stable share is that of `tfarm.ensemble.confidence`; an arm without a result counts as not stable.
 """
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -17,15 +14,15 @@ import numpy as np
 import scipy
 
 from tfarm.arrays import Real
+from tfarm.ensemble.confidence import least_share, least_share_words
+from tfarm.ensemble.space import Subjects
 from tfarm.errors import TfarmError, require
 from tfarm.loop.curve import decibels
 from tfarm.response import transfer
 from tfarm.response.frequency import resonant_band
 from tfarm.schema import Percent, Quantity
 from tfarm.studies.quantities import LOOPS, STABLE, is_labelled_number, loop_of, quantity_of
-from tfarm.studies.space import Subjects
 
-CONFIDENCE = 0.95
 QUANTILES = {"least": 0.0, "low": 0.05, "median": 0.5, "high": 0.95, "largest": 1.0}
 
 
@@ -55,9 +52,7 @@ class StableShare(NamedTuple):
             text += f" ({', '.join(others)})"
         if self.at_least is None:
             return text
-        # never more than was shown
-        percent = math.floor(1e4 * self.at_least + 1e-6) / 100
-        return f"{text}: at least {percent:g} % of all with {100 * CONFIDENCE:g} % confidence"
+        return f"{text}: {least_share_words(self.at_least)}"
 
 
 class Spread(NamedTuple):
@@ -84,12 +79,6 @@ class Failure(NamedTuple):
     reason: Annotated[str, Quantity("reason", help="error of the first of these arms, without its numbers")]
     arms: Annotated[int, Quantity("arms", help="number of arms with that reason")]
     row: Annotated[int, Quantity("first row", help="number of the first of these rows")]
-
-
-def least_share(successes: int, count: int) -> float:
-    """Return the share that is exceeded with 95 % confidence, one-sided (Clopper and Pearson, 1934)."""
-    test = scipy.stats.binomtest(successes, count, alternative="greater")
-    return float(test.proportion_ci(CONFIDENCE, method="exact").low)
 
 
 def shares_of(

@@ -13,12 +13,12 @@ from functools import cache, partial
 from itertools import chain
 from typing import Any, get_args, get_origin, get_type_hints
 
-# whose statistics take half a second to load
 from tfarm.arm import PLANE
 from tfarm.assessment.card import LoopCard, analysis_of, loop_card, words_of
 from tfarm.assessment.signal_figures import LoopResponse
 from tfarm.assessment.step import step
 from tfarm.dsp.stages import admit_case
+from tfarm.ensemble.space import Subject
 from tfarm.errors import ConvergenceError, TfarmError, must_be_known, require
 from tfarm.exact.system import system_of
 from tfarm.loop.poles import closed_loop_poles
@@ -29,7 +29,6 @@ from tfarm.schema import Quantity, quantities
 from tfarm.spectrum import damped_modes, modes
 from tfarm.spectrum.frequencies import list_frequencies
 from tfarm.spectrum.sensitivities import PARAMETERS
-from tfarm.studies.space import Subject
 from tfarm.tuner.tuning import tune_by_default
 
 # column of the reason of a missing result

@@ -14,7 +14,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from itertools import islice, takewhile
 from logging import getLogger
 from pathlib import Path
@@ -25,12 +25,13 @@ import numpy as np
 from tfarm.arm.schema import StrictTable, validated_file
 from tfarm.arrays import Real
 from tfarm.case import Case
+from tfarm.ensemble.declaration import STUDY_FILE
+from tfarm.ensemble.space import Space, Subject, Subjects, extra, parquet
 from tfarm.errors import ConvergenceError, ParameterError, TfarmError, one_line, require
 from tfarm.files import write_file
 from tfarm.records import frozen
 from tfarm.stopping import Progress
 from tfarm.studies.quantities import FAILED, Values, prepare, quantity_of, sources_of, values_of
-from tfarm.studies.space import Space, Subject, Subjects, extra, parquet
 
 # columns of a range of rows
 Chunk = dict[str, list[Any]]
@@ -61,7 +62,6 @@ OUT = "--out"
 # column of the number of the row, from 0
 ROW = "row"
 PARQUET = ".parquet"
-STUDY_FILE = "study.toml"
 # rows whose arms are built before the first run
 CHECKED = 1000
 
@@ -84,16 +84,19 @@ class StudyPlan:
         """Names of the columns of texts."""
         return {FAILED, *(name for name in self.names if not quantity_of(name).is_number)}
 
-    @cached_property
+    @property
     def sources(self) -> list[tuple[Set[str], Values]]:
-        """The functions of the columns that are asked for."""
-        return sources_of(self.names)
+        """The functions of the columns that are asked for; not kept in the plan, as no process can be sent them."""
+        return _kept_sources(self.names)
 
     @cached_property
     def subjects(self) -> Subjects:
         """The arms and loops of the rows."""
         fitted = self.space.posterior.keys if self.space.posterior else ()
         return Subjects(self.case, self.space.keys, fitted)
+
+
+_kept_sources = cache(sources_of)
 
 
 def chunk(plan: StudyPlan, first: int, last: int, listed: Real | None = None) -> Chunk:
@@ -341,7 +344,7 @@ def run_parts(
     count = min(CHECKED, plan.space.count)
     listing = plan.space.listing
     rows = plan.space.rows(0, count, None if listing is None else next(listing.blocks([(0, count)])))
-    check_rows(plan, rows)
+    plan.subjects.all_of(rows, range(count))
     parts = open_study(folder, plan, files, resources.workers, size, rows)
 
     def calls(ends: Sequence[tuple[int, int]]) -> Iterator[Callable[[], Chunk]]:
@@ -400,21 +403,6 @@ def search_rows(
     except TimeoutError:
         return None
     return seen
-
-
-def check_rows(plan: StudyPlan, rows: Real) -> None:
-    """Raise ParameterError where some of the first rows are illegal, with their number and the first reason."""
-    # which refuse an unknown key, before any row
-    subjects = plan.subjects
-    errors = dict[int, ParameterError]()
-    for number, row in enumerate(rows.tolist()):
-        try:
-            subjects.at(row)
-        except ParameterError as error:
-            errors[number] = error
-    for number, first in errors.items():
-        remedy = f"{len(errors)} of {len(rows)} arms are illegal, the first in row {number}: {first.remedy}"
-        raise ParameterError(key=first.key, value=first.value, remedy=remedy)
 
 
 # ------------------------------------------------------------------------------------------------------------ cluster

@@ -11,8 +11,9 @@ import numpy as np
 import scipy
 
 from tfarm.arrays import Real
+from tfarm.ensemble.confidence import CONFIDENCE
+from tfarm.ensemble.space import ENDS
 from tfarm.schema import Quantity
-from tfarm.studies.findings import CONFIDENCE
 from tfarm.studies.quantities import is_labelled_number
 from tfarm.studies.running import (
     Resources,
@@ -21,7 +22,6 @@ from tfarm.studies.running import (
     table_of,
     write_missing_parts,
 )
-from tfarm.studies.space import ENDS
 
 BOOTSTRAP = "95 % bootstrap interval; none without any influence"
 

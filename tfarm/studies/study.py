@@ -22,11 +22,12 @@ from typing import Annotated, Any
 
 import numpy as np
 
-# whose statistics take half a second to load
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.chain import Chain
 from tfarm.arm.checks import whole
 from tfarm.case import Case
+from tfarm.ensemble.declaration import files_of
+from tfarm.ensemble.space import listing_of, space_of
 from tfarm.errors import one_line, require
 from tfarm.files import locked_folder
 from tfarm.fitting.posterior import load_posterior
@@ -35,7 +36,6 @@ from tfarm.records import frozen
 from tfarm.schema import Column, Quantity, Table, text
 from tfarm.spectrum.gains import default_gains
 from tfarm.stopping import Progress
-from tfarm.studies.declaration import files_of
 from tfarm.studies.findings import (
     Failure,
     Spread,
@@ -57,7 +57,6 @@ from tfarm.studies.running import (
     run_parts,
 )
 from tfarm.studies.sobol import SobolIndex, sobol_indices
-from tfarm.studies.space import listing_of, space_of
 from tfarm.studies.worst import WorstArm, worst_arm
 
 

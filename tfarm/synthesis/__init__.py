@@ -5,7 +5,8 @@ structures  structures of laws: formula, coefficients with start and bounds, and
 judge       objectives, and scores of laws in a loop of few modes
 models      loops of few modes under many laws at once, and slews in them
 search      differential evolution from several starts, then a simplex
-worst_case  designs for several arms and for the worst inside a box
+worst_case  designs for several arms, for the worst inside a box and of a pool
+drawn       arms of an ensemble, of which a law is found on few and verified on fresh ones
 
 requirements    limits of quantities of card and slew, by name
 measures        margins, damping and speed of many laws at once, on a model

@@ -46,13 +46,15 @@ class Goal:
     """The least value of a quantity under requirements, as an objective of a judge.
 
     `shifts` tighten each requirement of the sampled (0) and of the continuous-time loop (1) on the model; `delays` are
-    further delays [periods] with which the sampled loop has to be stable.
+    further delays [periods] with which the sampled loop has to be stable.  A violation counts
+    by the `weight`.
     """
 
     requirements: tuple[Requirement, ...]
     minimised: str
     shifts: tuple[tuple[float, ...], tuple[float, ...]]
     delays: tuple[float, ...] = ()
+    weight: float = WEIGHT
 
     is_negated = False
     of_slew = False
@@ -99,7 +101,7 @@ class Goal:
                     # the crossovers of L leave out how a late input changes what is read; these models have the shift
                     growth = [of.growth(of.poles(sampled.entries)).max(axis=1) for of in judge.delayed]
                     violation = np.maximum(violation, np.max(growth, axis=0) / GROWTH_OF_DELAY)
-                total += WEIGHT * np.maximum(violation, 0.0)
+                total += self.weight * np.maximum(violation, 0.0)
         return total
 
     def excess(self, judges: Sequence[Any], law: AnyLaw) -> float:
@@ -109,7 +111,7 @@ class Goal:
         for judge in judges:
             entries = judge.entries(law)
             loop = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
-            found.append(float(plain._penalty(judge, loop)[0]) / WEIGHT)
+            found.append(float(plain._penalty(judge, loop)[0]) / self.weight)
         return max(found)
 
     @property
@@ -136,7 +138,7 @@ class Goal:
             score += float(np.log(max(float(measures.of(self.minimised)[0]), LEAST_SIZE)))
         for each, shift in zip(self.requirements, self.shifts[0], strict=True):
             if each.measure.of_slew:
-                score += WEIGHT * max(each.violation(figures[each.name]) + shift, 0.0)
+                score += self.weight * max(each.violation(figures[each.name]) + shift, 0.0)
         return score
 
     @staticmethod

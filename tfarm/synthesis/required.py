@@ -25,7 +25,7 @@ from tfarm.loop.edges import most_modes
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.records import frozen
 from tfarm.schema import Quantity
-from tfarm.synthesis.goals import Checked, Goal, check, polished
+from tfarm.synthesis.goals import WEIGHT, Checked, Goal, check, polished
 from tfarm.synthesis.judge import LOST, Judge, judge_of, model_sizes
 from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.models import sampled_model
@@ -34,7 +34,9 @@ from tfarm.synthesis.search import Search, Worst, search
 from tfarm.synthesis.structures import Structure
 from tfarm.synthesis.worst_case import Effort, NamedArm, Tell
 
-# of a violation on the models: less may be met after a search that goes on; more is out of reach
+# of a violation on the models: less is met after a search that goes on
+MET = 1e-3
+# and without one requirement, where the others are looked at
 NEAR = 0.05
 DELAY = "delay_margin_periods"
 
@@ -152,9 +154,15 @@ class RequirementTask:
                 continue
             if best is None or chosen.violation < best.violation:
                 best = chosen
-            if chosen.violation <= 0 or goal.excess(judges, chosen.law) > NEAR:
+            if chosen.violation <= 0:
                 break
             near = chosen.x
+            if goal.excess(judges, chosen.law) > MET:
+                # the weight is below the multipliers, or no law meets the requirements
+                if goal.weight > WEIGHT:
+                    break
+                goal = replace(goal, weight=10 * WEIGHT)
+                continue
             goal = self._corrected(goal, chosen.violations)
         if best is None:
             raise ConvergenceError(why_none(named, form, law, self.chain, max(map(max, sizes))), law, None)

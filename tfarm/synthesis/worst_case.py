@@ -1,8 +1,8 @@
 """A law for the worst of several arms: of a list, of the corners of a box over numbers of one, and of arms inside it.
 
-The law is chosen for the arms of a list.  The box is then searched for an arm on which it is worse, which is added to
-the list, and the law is chosen again: the exchange method of semi-infinite programming (Hettich and Kortanek, 1993).
-The first arms are added by laws of a short search.
+The law is chosen for the arms of a list.  The box, or a pool of drawn arms, is then searched for an arm on which it is
+worse, which is added to the list, and the law is chosen again: the exchange method of semi-infinite programming
+(Hettich and Kortanek, 1993).  The first arms are added by laws of a short search.
 That is no proof over the box: between the arms of the list nothing is certain.
 """
 
@@ -99,34 +99,60 @@ class ArmBox:
         values = ", ".join(f"{key} = {value:.6g}" for key, value in numbers.items())
         return NamedArm(f"{self.arm.name}, {values}", arm, numbers)
 
+    def worst(self, badness: Callable[[Arm], float]) -> tuple[NamedArm, float, int]:
+        """Return the worst arm found inside, its badness, and the number of arms tried.
 
-def worst_inside(box: ArmBox, badness: Callable[[Arm], float]) -> tuple[NamedArm, float, int]:
-    """Return the worst arm found in a box, its badness, and the number of arms tried.
+        Arms at random, then smaller and smaller steps along each number from the worst of them.  No proof that none is
+        worse.
+        """
+        tried = 0
+        size = len(self.ranges)
 
-    Arms at random, then smaller and smaller steps along each number from the worst of them.  No proof that none is
-    worse.
+        def worst_of(places: Sequence[Real]) -> tuple[float, Real]:
+            nonlocal tried
+            tried += len(places)
+            scores = [badness(self.at(each).arm) for each in places]
+            n = int(np.argmax(scores))
+            return scores[n], places[n]
+
+        worst, place = worst_of([*np.random.default_rng(0).random((ARMS_TRIED, size))])
+        ways = np.concatenate([np.eye(size), -np.eye(size)])
+        # from the worst of them on, along each of the numbers
+        for step in (0.25, 0.125, 0.0625):
+            if math.isinf(worst):
+                break
+            worse, other = worst_of([*np.clip(place + step * ways, 0.0, 1.0)])
+            if worse > worst:
+                worst = worse
+                place = other
+        return self.at(place), worst, tried
+
+    def case(self, tried: int, worse: str | None) -> "WorstCase":
+        """Return the choice of the arms."""
+        return WorstCase(self.ranges, tried, worse)
+
+
+@frozen
+class DrawnArms:
+    """Arms of an ensemble: a `pool`, of which the worst are found for a law, and `fresh` ones, which examine it.
+
+    Of arms that are independent draws (`is_independent`) the fresh ones are, whatever the law.
     """
-    tried = 0
-    size = len(box.ranges)
 
-    def worst_of(places: Sequence[Real]) -> tuple[float, Real]:
-        nonlocal tried
-        tried += len(places)
-        scores = [badness(box.at(each).arm) for each in places]
+    source: str
+    pool: tuple[NamedArm, ...]
+    fresh: tuple[NamedArm, ...]
+    is_independent: bool
+
+    def worst(self, badness: Callable[[Arm], float]) -> tuple[NamedArm, float, int]:
+        """Return the worst arm of the pool, its badness, and the number of arms tried."""
+        scores = [badness(each.arm) for each in self.pool]
         n = int(np.argmax(scores))
-        return scores[n], places[n]
+        return self.pool[n], scores[n], len(scores)
 
-    worst, place = worst_of([*np.random.default_rng(0).random((ARMS_TRIED, size))])
-    ways = np.concatenate([np.eye(size), -np.eye(size)])
-    # from the worst of them on, along each of the numbers
-    for step in (0.25, 0.125, 0.0625):
-        if math.isinf(worst):
-            break
-        worse, other = worst_of([*np.clip(place + step * ways, 0.0, 1.0)])
-        if worse > worst:
-            worst = worse
-            place = other
-    return box.at(place), worst, tried
+    def case(self, tried: int, worse: str | None) -> "WorstCase":
+        """Return the choice of the arms."""
+        return WorstCase({}, tried, worse, len(self.pool), self.source)
 
 
 def arms_of(arm: Arm, also: Sequence[Arm], box: ArmBox | None) -> list[NamedArm]:
@@ -147,22 +173,29 @@ class WorstCase(NamedTuple):
     """Choice of the arms of a design: the `ranges` of the box, and the number of arms `tried` inside it.
 
     `worse` names an arm inside on which the law is still worse, where the exchange ended before there was none.
+    Of an ensemble there are no ranges, but `drawn` arms of a `source`.
     """
 
     ranges: dict[str, Bounds]
     tried: int
     worse: str | None = None
+    drawn: int = 0
+    source: str = ""
 
     def sentence(self, number: int) -> str:
         """Return the choice in a sentence, with its limits."""
+        ended = "none that is worse"
+        if self.worse is not None:
+            ended = f"still a worse one, {self.worse}"
+        if self.drawn:
+            return (
+                f"the worst of {number} arms; a search among {self.drawn} arms of {self.source} found {ended}"
+            )
         if number == 1:
             return ""
         if not self.ranges:
             return f"the worst of {number} arms"
         box = ", ".join(f"{key} {low:g} to {high:g}" for key, (low, high) in self.ranges.items())
-        ended = "none that is worse"
-        if self.worse is not None:
-            ended = f"still a worse one, {self.worse}"
         return (
             f"the worst of {number} arms, the corners of the box {box} among them; a search of {self.tried} arms "
             f"inside it found {ended}: no proof over the box"
@@ -171,22 +204,22 @@ class WorstCase(NamedTuple):
 
 def for_the_worst(
     arms: Sequence[NamedArm],
-    box: ArmBox | None,
+    region: ArmBox | DrawnArms | None,
     find: Callable[[Sequence[NamedArm], _Robust | None, Effort], _Robust],
     score_on: Callable[[_Robust, Arm], float],
     tell: Tell,
 ) -> tuple[_Robust, list[NamedArm], WorstCase]:
-    """Return the result of `find` for the arms and for worse ones inside the box, with all of these arms.
+    """Return the result of `find` for the arms and for worse ones of a region, with all of these arms.
 
     The first worse arms are those of sketches, so that the whole search already has them.  `find` is given the arms,
     what it found before, near which it may begin, and its effort.
     `score_on` is the score of one arm, inf where the law is unstable.  Raises ConvergenceError where no law is found
-    that is stable on all arms, or where it stays unstable on one inside the box.
+    that is stable on all arms, or where it stays unstable on one of the region.
     """
     # of a score: an arm inside is added if it is worse by more
     much_worse = 0.01
     named = list(arms)
-    if box is None:
+    if region is None:
         return find(named, None, "whole"), named, WorstCase({}, 0)
     efforts: list[Effort] = ["sketch", "sketch", "whole", *("near",) * 4]
     tried = 0
@@ -195,15 +228,15 @@ def for_the_worst(
         effort = efforts.pop(0)
         found = find(named, found, effort)
         limit = max(score_on(found, each.arm) for each in named)
-        worst, score, number = worst_inside(box, partial(score_on, found))
+        worst, score, number = region.worst(partial(score_on, found))
         tried += number
         is_worse = score > limit + much_worse * abs(limit)
         if effort != "sketch" and not is_worse:
-            return found, named, WorstCase(box.ranges, tried)
+            return found, named, region.case(tried, None)
         if not efforts and math.isinf(score):
             raise ConvergenceError(f"no law found is stable on {worst.name}: narrow the ranges", None, None)
         if not efforts:
-            return found, named, WorstCase(box.ranges, tried, worst.name)
+            return found, named, region.case(tried, worst.name)
         if is_worse:
             tell(f"{worst.name} is worse than the other {len(named)} arms, and added")
             named.append(worst)

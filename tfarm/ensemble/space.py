@@ -1,4 +1,4 @@
-"""Values over which a study varies an arm and its loop: distributions, grids, lists of rows, the posterior of a fit.
+"""Values over which an ensemble varies an arm and its loop: distributions, grids, lists of rows, a posterior of a fit.
 
 Row n depends on the seed and on n alone: its uniform numbers are those of the counter-based generator Philox (Salmon et
 al., Parallel random numbers: as easy as 1, 2, 3, 2011) at counter n, and each distribution is applied by its inverse.
@@ -14,7 +14,7 @@ from contextlib import nullcontext, suppress
 from dataclasses import fields, replace
 from functools import cached_property, partial
 from importlib import import_module
-from itertools import islice
+from itertools import islice, repeat
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -75,7 +75,7 @@ class Distribution(NamedTuple):
 
 
 class Subject(NamedTuple):
-    """One case of a study, with numbers of the tuner."""
+    """One case of an ensemble, with numbers of the tuner."""
 
     case: Case
     tuner: dict[str, float]
@@ -99,7 +99,7 @@ class Listing(NamedTuple):
 
 @frozen(kw_only=True)
 class Space:
-    """Numbers that a study varies; `draws` of the distributions, each with every point of the grid.
+    """Numbers that vary in an ensemble; `draws` of the distributions, each with every point of the grid.
 
     The rows of a list are counted in the place of draws.
     """
@@ -146,6 +146,12 @@ class Space:
     def is_independent(self) -> bool:
         """Whether the rows are independent draws: confidence needs that."""
         return bool(self.drawn_keys) and not (self.grids or self.listing)
+
+    def some_rows(self, numbers: Sequence[int]) -> Real:
+        """Return the rows (numbers, keys) of these numbers, which ascend; of independent draws any."""
+        ends = [(n, n + 1) for n in numbers]
+        blocks = repeat(None) if self.listing is None else self.listing.blocks(ends)
+        return np.vstack([self.rows(*end, block) for end, block in zip(ends, blocks, strict=False)])
 
     def rows(self, first: int, last: int, listed: Real | None) -> Real:
         """Return rows first to last - 1 (rows, keys); `listed` are those of the list behind them."""
@@ -292,6 +298,23 @@ class Subjects:
             chain = replace(chain, **{table: replace(getattr(chain, table), **{name: values[key]})})
         tuner = {name: values[key] for key, name in self._of_tuner.items()}
         return Subject(Case(arm, law, chain), tuner)
+
+    def all_of(self, rows: Real, numbers: Sequence[int]) -> list[Subject]:
+        """Return the cases of rows of these numbers.
+
+        Raises ParameterError with the count of illegal ones, and the number and reason of the first.
+        """
+        found = []
+        errors = dict[int, ParameterError]()
+        for n, row in zip(numbers, rows.tolist(), strict=True):
+            try:
+                found.append(self.at(row))
+            except ParameterError as error:
+                errors[n] = error
+        for n, first in errors.items():
+            remedy = f"{len(errors)} of {len(rows)} arms are illegal, the first in row {n}: {first.remedy}"
+            raise ParameterError(key=first.key, value=first.value, remedy=remedy)
+        return found
 
 
 # ------------------------------------------------------------------------------------------------------------ lists

@@ -17,10 +17,10 @@ from tfarm.arm import to_toml
 from tfarm.arm.schema import arm_of_table
 from tfarm.arm.writing import numbers_of
 from tfarm.case import Case
+from tfarm.ensemble.declaration import files_of
+from tfarm.ensemble.space import ENDS, Listing, Subjects, lines_of, listing_of, space_of
 from tfarm.errors import ParameterError
 from tfarm.fitting.posterior import Posterior, PosteriorNumber
-from tfarm.studies.declaration import files_of
-from tfarm.studies.space import ENDS, Listing, Subjects, lines_of, listing_of, space_of
 
 CHANCE = 1e-3  # of a right distribution to be called wrong
 TRUE = {  # by kind: its numbers, and the distribution by another formula than the code's
