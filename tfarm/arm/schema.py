@@ -198,7 +198,7 @@ ARM_TABLES: dict[str, type[StrictTable]] = {"": ArmTable, **PART_TABLES}
 def arm_of_table(table: dict[str, Any]) -> Arm:
     """Return the arm of a parsed TOML table.  Raises ParameterError for the first problem."""
     # of the loop: read by other rooms
-    loop_tables = ("sampling", "converters", "actuator", "slew", "law")
+    loop_tables = ("sampling", "converters", "actuator", "slew", "law", "weights")
     head = validate_table(
         ArmTable, {key: value for key, value in table.items() if key not in loop_tables}, ""
     )
