@@ -83,7 +83,7 @@ def test_no_dense_value_is_above_the_bound_nor_more_than_a_thousandth_below(size
     outcomes, figures, wrong = tally(norms, size, 1)
     assert wrong == 0
     assert outcomes["bounded"] >= 0.9 * size
-    assert max(figures["values"]) < 1e-4
+    assert max(figures["values"]) < 1e-6
 
 
 def test_poles_that_decay_within_a_sample_respond_with_the_moments_of_their_residues():

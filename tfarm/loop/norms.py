@@ -343,7 +343,7 @@ def _bounded(
     its function by more than the tolerance; the bounds of a search that takes too many hold too.
     """
     # more of them take seconds
-    most_arcs = 300_000
+    most_arcs = 150_000
     low = circle.low
     high = circle.high
     parts = circle.parts
