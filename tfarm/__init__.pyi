@@ -30,6 +30,7 @@ from tfarm.fitting.fit import fit as fit
 from tfarm.fitting.overlay import overlay as overlay
 from tfarm.loop.locus import locus as locus
 from tfarm.loop.margins import margins as margins
+from tfarm.loop.norms import norm as norm
 from tfarm.loop.nyquist import nyquist as nyquist
 from tfarm.loop.plane import gain_map
 from tfarm.loop.poles import closed_loop_poles as closed_loop_poles

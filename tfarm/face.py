@@ -66,6 +66,7 @@ class CaseFace(Case):
     map = Question("map")
     spill = Question("spill")
     sampled = Question("sampled")
+    norm = Question("norm")
     card = Question("result_card")
     loop_function = Question("loop_function")
     step = Question("step")

@@ -24,6 +24,7 @@ from tfarm.cli.options import (
     load_driven_loop,
     load_loop,
     name_and,
+    numbers,
     refuse,
 )
 from tfarm.cli.output import emit, emit_loop, emit_record, has_options
@@ -237,6 +238,40 @@ def sampled(
     case = case.through(chain(arm))
     found = case.sampled(count=modes)
     show(found, defaults, summary=case.card(at_samples=found))
+
+
+def weight_entry(text: str) -> tuple[Any, ...]:
+    """Return numerator and denominator of NUM/DEN, coefficients in descending powers of s; of NUM over 1."""
+    num, _, den = text.partition("/")
+    coefficients = numbers("coefficients NUM or NUM/DEN in descending powers of s, such as 0.5,2/1,0.02")
+    return coefficients(num), coefficients(den or "1")
+
+
+@command(epilog="norm sasaki2012-lab --K1 3 --K2 0.15 --weight S=0.5,2/1,0.02 --weight KS=0.1")
+def norm(
+    *,
+    arm: ArmName,
+    weight: Annotated[
+        list[Any] | None, typer.Option(parser=name_and(weight_entry), metavar="NAME=NUM/DEN")
+    ] = None,
+    loop: Any = load_loop,
+    chain: Any = chain_of_options,
+    show: Any = emit_record,
+) -> None:
+    """H-infinity norms of weighted S, K S and T, with upper bounds.
+
+    They are those of the sampled loop, and the bounds hold between frequencies too.  The weights are those of
+    [weights] in the controller's file, else in the arm's; without any S and T have the weight 1.
+
+    Options:
+    weight: weight on S, KS or T, coefficients in descending powers of s; may be repeated, and replaces those of a file
+    """
+    from tfarm.arm.law_tables import load_weights
+
+    law = loop.keywords["law"]
+    wanted: Any = dict(weight or ()) or (law and load_weights(law)) or load_weights(arm)
+    case, defaults = loop(arm)
+    show(case.through(chain(arm)).norm(weights=wanted), defaults)
 
 
 @command(epilog="step sasaki2012-lab --scenario slew --png slew.png")
