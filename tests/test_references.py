@@ -169,7 +169,10 @@ def some_loop(rng):
             continue
         law = tfarm.HubFeedback(K1=usual.K1 * 10 ** rng.uniform(-1, 1), K2=0.0, Kp=usual.K1 * w * rng.uniform(0, 0.02))
         period = float(f"{2 * math.pi / w / rng.uniform(30, 60):.3g}")
-        chain = replace(shaped(period=period), slew=Slew(rise_time=float(f"{2 * math.pi / w * rng.uniform(1, 4):.3g}")))
+        chain = replace(
+            shaped(period=period),
+            slew=Slew(travel=1e-3 * arm.reach, rise_time=float(f"{2 * math.pi / w * rng.uniform(1, 4):.3g}")),
+        )
         if sampled_loop(Case(arm, law, chain)).is_stable:
             return arm, law, chain
 

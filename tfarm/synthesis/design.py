@@ -40,17 +40,7 @@ from tfarm.synthesis.worst_case import (
 
 CONSUMER = Consumer(
     "design",
-    acts=(
-        "reference",
-        "shaper",
-        "anti-alias filter",
-        "hub rate",
-        "law",
-        "hold",
-        "delay",
-        "hub damping",
-        "plant",
-    ),
+    acts=("reference", "anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
     partly=(
         "encoder",
         "amplifier steps",

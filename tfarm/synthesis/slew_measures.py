@@ -9,7 +9,8 @@ import numpy as np
 from tfarm.arm import AnyLaw, Arm
 from tfarm.case import Case
 from tfarm.dsp import Chain, Scenario, traces
-from tfarm.dsp.scenarios import scenario
+from tfarm.dsp.scenarios import slew_scenario
+from tfarm.dsp.shaping import impulses_of
 from tfarm.dsp.simulate import Simulator
 from tfarm.dsp.simulation import final_value, settling_time
 from tfarm.records import frozen
@@ -28,15 +29,19 @@ class SlewMeasures:
     count: int
 
     @cached_property
-    def task(self) -> Scenario:
-        """The slew, and after it as long again or four periods of the first mode."""
+    def plain(self) -> Scenario:
+        """The slew without its shaper, and after it as long again or four periods of the first mode."""
         rise = self.chain.slew.rise_time
         left = max(2 * rise, 4 * 2 * np.pi / first_frequency(self.arm), 64 * self.chain.sampling.period)
-        return scenario("slew", self.known, self.chain, rise + left)
+        long = self.chain.reference.shaper != "none"
+        # a shaper of two modes may be as long as a period and a half
+        more = 3 * np.pi / first_frequency(self.arm) * long
+        return slew_scenario(self.known, self.chain, rise + left + more)
 
     def of(self, law: AnyLaw) -> dict[str, float]:
         """Return the figures by name of the measure, inf where the run stops or the tip does not settle."""
-        task = self.task
+        impulses = impulses_of(self.known, self.chain, law)
+        task = self.plain.through(impulses) if impulses.size > 1 else self.plain
         run = Simulator(
             Case(self.arm, law, self.chain), task, count=self.count, between=4, outputs=(TIP,)
         ).run()
