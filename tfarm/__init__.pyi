@@ -37,6 +37,7 @@ from tfarm.loop.poles import closed_loop_poles as closed_loop_poles
 from tfarm.loop.sampled_analysis import sampled as sampled
 from tfarm.loop.spillover import spill as spill
 from tfarm.reduced import reduce as reduce
+from tfarm.references import reference as reference
 from tfarm.report.live import explore as explore
 from tfarm.response import bode as bode
 from tfarm.response import transfer as transfer

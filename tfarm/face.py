@@ -71,6 +71,7 @@ class CaseFace(Case):
     loop_function = Question("loop_function")
     step = Question("step")
     simulate = Question("simulate")
+    reference = Question("reference")
     export = Question("export")
     explore = Question("explore")
     study = Question("study")

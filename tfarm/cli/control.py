@@ -1,6 +1,7 @@
 """The commands on the continuous-time loop and on the sampled one."""
 
 import re
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -26,6 +27,7 @@ from tfarm.cli.options import (
     name_and,
     numbers,
     refuse,
+    without_none,
 )
 from tfarm.cli.output import emit, emit_loop, emit_record, has_options
 from tfarm.cli.progress import print_line
@@ -300,6 +302,37 @@ def step(
     case, defaults = loop(arm)
     case = case.through(chain(arm))
     show(case.step(scenario, duration, outputs=output or (), settling_band=settling_band), defaults)
+
+
+@command(epilog="reference sasaki2012-lab --shaper ZVD --figure reference.png")
+def reference(
+    *,
+    arm: ArmName,
+    shaper: str | None = None,
+    profile: str | None = None,
+    modes: Annotated[int | None, typer.Option("--modes", min=1, max=10)] = None,
+    error: float = 0.3,
+    loop: Any = load_loop,
+    chain: Any = chain_of_options,
+    show: Any = emit,
+) -> None:
+    """Shaped reference of the slew: impulses, and residual vibration.
+
+    The residual is that of the sampled loop over an error of its frequencies.
+
+    Options:
+    shaper: none, ZV, ZVD or EI; by default that of [reference] in the file
+    profile: bang-bang, s-curve or polynomial; by default that of [reference]
+    modes: the first flexible modes, which are shaped for; by default those of [reference], or two
+    error: largest error of the frequencies, as a share
+    """
+    case, defaults = loop(arm)
+    own = chain(arm)
+    typed: Any = without_none({"shaper": shaper, "profile": profile, "modes": modes})
+    if profile is not None:
+        typed["file"] = None
+    case = case.through(replace(own, reference=replace(own.reference, **typed)))
+    show(case.reference(error=error), defaults)
 
 
 @command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")

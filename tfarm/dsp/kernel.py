@@ -21,6 +21,7 @@ CONSUMER = Consumer(
     "simulate",
     acts=(
         "reference",
+        "shaper",
         "anti-alias filter",
         "encoder",
         "hub rate",

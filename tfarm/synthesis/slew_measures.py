@@ -9,7 +9,8 @@ import numpy as np
 from tfarm.arm import AnyLaw, Arm
 from tfarm.case import Case
 from tfarm.dsp import Chain, Scenario, traces
-from tfarm.dsp.scenarios import scenario
+from tfarm.dsp.scenarios import slew_scenario
+from tfarm.dsp.shaping import impulses_of
 from tfarm.dsp.simulate import Simulator
 from tfarm.dsp.simulation import final_value, settling_time
 from tfarm.records import frozen
@@ -35,13 +36,16 @@ class SlewMeasures:
 
     @cached_property
     def tasks(self) -> list[Scenario]:
-        """The slew, after it as long again or four periods of the first mode, and a longer record for slow loops."""
+        """The slew without its shaper and as long again or four periods of mode 1, then a record for slow loops."""
         rise = self.chain.slew.rise_time
         period = self.chain.sampling.period
         left = max(2 * rise, 4 * 2 * np.pi / first_frequency(self.arm), 64 * period)
+        if self.chain.reference.shaper != "none":
+            # a shaper of two modes may be as long as a period and a half
+            left += 3 * np.pi / first_frequency(self.arm)
         durations = [rise + length * left for length in LENGTHS]
         most = max(durations[0], MOST_SAMPLES * period)
-        return [scenario("slew", self.known, self.chain, each) for each in durations if each <= most]
+        return [slew_scenario(self.known, self.chain, each) for each in durations if each <= most]
 
     def of(self, law: AnyLaw) -> dict[str, float]:
         """Return the figures by name of the measure, inf where the run stops or the tip does not settle.
@@ -50,7 +54,9 @@ class SlewMeasures:
         """
         case = Case(self.arm, law, self.chain)
         found: dict[str, float] = {}
-        for task in self.tasks:
+        impulses = impulses_of(self.known, self.chain, law)
+        for plain in self.tasks:
+            task = plain.through(impulses) if impulses.size > 1 else plain
             run = Simulator(case, task, count=self.count, between=4, outputs=(TIP,)).run()
             if run.stopped is not None:
                 names = ("settling_time_s", "overshoot", "residual_moment", "peak_input")
