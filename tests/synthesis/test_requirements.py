@@ -43,6 +43,11 @@ def test_a_bad_requirement_is_refused_with_its_form(capsys, text, words):
     assert words in refused(capsys, "design", "sasaki2012-lab", "--require", text)
 
 
+def test_what_is_large_in_a_good_loop_is_not_minimised(capsys):
+    err = refused(capsys, "design", "sasaki2012-lab", "--minimise", "damping", "--require", "good")
+    assert "is large in a good loop" in err
+
+
 def test_requirements_of_a_file_are_read_and_its_errors_name_it(tmp_path):
     file = tmp_path / "arm.toml"
     file.write_text(f"{file_text(LAB)}\n[requirements]\nPM = 50\n")

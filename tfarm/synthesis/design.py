@@ -4,9 +4,11 @@ A search within bounds by a judge of few modes is followed by exact verdicts, wh
 has the number of searches that agreed, the width of the optimum, and whether the bounds cut the search off.
 """
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import islice
 from operator import attrgetter, itemgetter
 from typing import Annotated, Any, Literal, NamedTuple
@@ -26,6 +28,7 @@ from tfarm.loop.sampled_brief import SampledBrief, sampled_brief
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import frozen
 from tfarm.schema import Quantity
+from tfarm.synthesis.drawn import AnyStudy, Verification, drawn_arms, verify, violation_on
 from tfarm.synthesis.goals import Checked
 from tfarm.synthesis.judge import LOST, OBJECTIVES, TOO_SLOW, Judge, judge_of, model_sizes
 from tfarm.synthesis.models import slew_and_after, trial_slew
@@ -194,6 +197,11 @@ class Design:
         Quantity("sensitivities", help="changes of the required quantities, sampled loop, by the model"),
     ] = ()
 
+    verification: Annotated[
+        Verification | None,
+        Quantity("fresh arms", help="requirements on arms drawn from a study or posterior"),
+    ] = None
+
     @property
     def is_met(
         self,
@@ -294,6 +302,9 @@ def design(
     progress: Tell | None = None,
     also: Sequence[Arm] = (),
     ranges: Mapping[str, Bounds] | None = None,
+    study: AnyStudy | None = None,
+    posterior: str | os.PathLike[str] | None = None,
+    fresh: int = 64,
 ) -> Design:
     """Return the law of a structure with the best value of an objective in the sampled loop of a chain (default 10 ms).
 
@@ -317,7 +328,12 @@ def design(
     `also` are further arms for the law, `ranges` the ends of numbers of the arm, such as {"payload.mass": (0.1, 0.5)}.
     The objective is then the worst of the arm, of those, of the corners of the box, and of worse arms inside it that a
     search finds, which is no proof over the box.  The law is stable on each arm in `.arms`; references and feed-forward
-    are those of the arm itself.  Raises ParameterError for options that exclude each other, ConvergenceError where no
+    are those of the arm itself.
+
+    `study` is the file of a study, or its table of distributions, `posterior` that of a fit: requirements are met on
+    the worst arms of a pool drawn from them, and `fresh` further arms examine the law, `.verification`.
+
+    Raises ParameterError for options that exclude each other, ConvergenceError where no
     stable law is found.
     """
     if continuous and objective is None and require is None:
@@ -330,6 +346,9 @@ def design(
     options = _Options(
         arm, structure, {"K1": K1, "K2": K2}, Kp, modes, chain or Chain(), tuple(also), box, progress
     )
+    is_of_drawn = study is not None or posterior is not None
+    remedy = "requirements hold on arms of a study or posterior: name --minimise by one of their quantities"
+    require_that(not (is_plain and is_of_drawn), "objective", objective, remedy)
     if is_plain:
         remedy = "the cost of the tuner's trial is one of samples: design for the sampled loop"
         require_that(objective != "cost" or not continuous, "objective", objective, remedy)
@@ -339,7 +358,13 @@ def design(
         task = _DesignTask(arm, str(objective), form, modes, options.chain, continuous, options.tell)
         return task.design(*for_the_worst(arms, box, task.find, task.score_on, options.tell))
     search_for, arms = options.task(objective, require)
-    found, named, case = for_the_worst(arms, box, search_for.find, search_for.score_on, options.tell)
+    drawn = None
+    worst = search_for.score_on
+    if is_of_drawn:
+        require_that(box is None, "range", ranges, "a study or posterior has its own ranges: leave these out")
+        drawn = drawn_arms(arm, study, posterior, fresh)
+        worst = partial(violation_on, search_for)
+    found, named, case = for_the_worst(arms, box or drawn, search_for.find, worst, options.tell)
     conflicts: tuple[str, ...] = ()
     alternatives: tuple[str, ...] = ()
     if found.violation > 0:
@@ -350,6 +375,7 @@ def design(
         _record(search_for, found, named, case, is_continuous=False),
         requirements=found.checked,
         sensitivities=tuple(search_for.sensitivities(found)),
+        verification=verify(search_for, found, drawn, options.tell) if drawn is not None else None,
         conflicts=conflicts,
         alternatives=alternatives,
     )
@@ -432,6 +458,8 @@ class _Options:
             # an arm that cannot turn has no slew
             objective = "settling" if self.arm.has_rigid_mode else "time-constant"
         minimised = measure_named(objective, "objective")
+        remedy = "is large in a good loop: require it, and minimise settling, time-constant, torque or Ms"
+        require_that(MEASURES[minimised].sense == "<=", "objective", objective, remedy)
         limits = requirements_of("good" if wanted is None else wanted)
         if MEASURES[minimised].of_slew or any(each.measure.of_slew for each in limits):
             must_turn(self.arm)
