@@ -358,7 +358,7 @@ def _draw_good(found: GoodRegion, ax: Axes) -> None:
     """Fill the gains whose margins have the grade good in both loops."""
     words = "grade good in both loops, approximate"
     if not found.met.any():
-        words += ": nowhere in this picture"
+        words += ": none found on the grid"
     key_area(words, ax, facecolor=GOOD, alpha=0.55, lw=0)
     ax.contourf(found.x, found.y, found.excess, (-np.inf, 0.0), colors=[GOOD], alpha=0.55, zorder=2.2)
 

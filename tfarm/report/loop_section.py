@@ -95,13 +95,15 @@ def nyquist_section(report: ArmReport) -> PageSection:
     counts: dict[str, Nyquist] = {}
     for each in report.in_s:
         counts[each.title] = found = each.nyquist
+        # of the recommended gains the Bode plot has the numbers, and large arcs are those of the same signals
+        is_own = each.key != "recommended"
         linear = loop_function.nyquist.figure(found, name=each.name)
-        disc = loop_function.disc.figure(found, name=each.name)
+        data = curve_table(found) if is_own else ()
         stem = each.stem("nyquist")
-        blocks += [
-            picture_block("nyquist_plot", linear, stem=stem, data=curve_table(found), each=each, found=found),
-            picture_block("nyquist_disc", disc, stem=f"{stem}-disc", each=each, found=found),
-        ]
+        blocks.append(picture_block("nyquist_plot", linear, stem=stem, data=data, each=each, found=found))
+        if is_own:
+            disc = loop_function.disc.figure(found, name=each.name)
+            blocks.append(picture_block("nyquist_disc", disc, stem=f"{stem}-disc", each=each, found=found))
     own = any(found.unstable_open for found in counts.values())
     blocks.append(sheet("nyquist_count", across(counts), own=own))
     return PageSection(

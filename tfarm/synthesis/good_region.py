@@ -136,7 +136,7 @@ def good_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GoodRegion | None:
         if found.excess.min() >= UNSTABLE_EXCESS:
             return None
         # a region that is thin on a grid may go on beyond, or lie between its rows
-        for _ in range(4):
+        for _ in range(3):
             inside = found.excess <= max(0.0, float(found.excess.min()))
             fine_x = found.x
             if found.met.any():
@@ -148,7 +148,7 @@ def good_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GoodRegion | None:
             up = found.met.any(axis=1)
             if not is_coarse and not (_goes_on(x, found.x, across) or _goes_on(y, found.y, up)):
                 break
-        return _stable_on_all(found)
+        return found
     except (ConvergenceError, ParameterError):
         return None
 
@@ -206,7 +206,7 @@ def _measured(judge: Judge, goal: Goal, arm: Arm, x: Real, y: Real) -> GoodRegio
             excess[some] = np.minimum(worst, UNSTABLE_EXCESS)
             time_constant[some] = sampled.dominant_time_constant(first_frequency(arm))
     shape = (y.size, x.size)
-    return GoodRegion(judge, goal, x, y, excess.reshape(shape), time_constant.reshape(shape))
+    return _stable_on_all(GoodRegion(judge, goal, x, y, excess.reshape(shape), time_constant.reshape(shape)))
 
 
 def _stable_on_all(found: GoodRegion) -> GoodRegion:
