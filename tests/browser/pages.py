@@ -37,6 +37,7 @@ from tfarm.loop.stability import stability
 from tfarm.report.live import ASSETS, SCRIPT, LivePage, save_live, write_assets
 from tfarm.report.page import ArmReport, GivenLaw
 from tfarm.schema import to_dict
+from tfarm.synthesis.stability_map import recommended_gains
 
 Real = NDArray[np.float64]
 
@@ -520,6 +521,47 @@ def test_an_unstable_loop_has_no_settled_slew_and_its_real_pole_no_damping_ratio
             card = tfarm.result_card(arm, law, chain).sampled
             wanted = {"slew-settled": "unstable", "sampled": "unstable"}
             assert here == wanted | {"z-ratio": f"{100 * card.least_damping.ratio:.4g}"}
+
+
+SHADE = """([name, x, y]) => {
+  const canvas = document.querySelector(`#${name} canvas`), ratio = canvas.width / canvas.clientWidth;
+  const [wide, high] = live.room(name), dot = document.createElement("canvas");
+  const at = [58 + x * wide, 8 + y * high].map(each => Math.round(each * ratio));
+  dot.width = dot.height = 1;
+  const on = dot.getContext("2d", { willReadFrequently: true });
+  on.drawImage(canvas, ...at, 1, 1, 0, 0, 1, 1);
+  return on.getImageData(0, 0, 1, 1).data[3];
+}"""
+
+
+def test_what_the_requirements_forbid_is_shaded_and_the_recommended_gains_are_good(browser, folder):
+    """Ms = 2 is a disc around -1 on the Nyquist plot; below the least damping chosen the plane of poles is shaded."""
+    with live_page(browser, folder) as opened:
+        page = opened.page
+        page.click("#recommend")
+        page.wait_for_function("() => live.rested === live.now.law")
+        chosen = recommended_gains(tfarm.load(ARMS[0]), load_chain(ARMS[0])).law
+        assert page.evaluate("live.law") == chosen.by_name
+        for grade in ("s-phase", "s-delay", "s-peak", "z-phase", "z-delay", "z-peak"):
+            assert page.inner_text(f"#{grade}-grade") == "good"
+        wide, high = page.evaluate("live.room('nyquist')")
+        ends = [2.5 * max(1.0, wide / high), 2.5 * max(1.0, high / wide)]
+        for real, imag, is_shaded in (
+            (-1.22, 0.27, True),
+            (-0.9, -0.3, True),
+            (-1.62, 0.45, False),
+            (-1.3, -0.6, False),
+        ):
+            place = [(real + ends[0]) / (2 * ends[0]), (ends[1] - imag) / (2 * ends[1])]
+            assert (page.evaluate(SHADE, ["nyquist", *place]) > 0) is is_shaded
+        left, right = page.evaluate("live.now.frame.x")
+        # a damping ratio of 1.8 %, at nine tenths of the height
+        top = page.evaluate("live.now.frame.y[1]")
+        place = ["poles", (-0.018 * 0.9 * top - left) / (right - left), 0.1]
+        for ratio, is_shaded in (("0", False), ("2", True), ("1", False)):
+            page.select_option("#ratio", ratio)
+            page.wait_for_function("() => live.rested === live.now.law")
+            assert (page.evaluate(SHADE, place) > 0) is is_shaded
 
 
 def test_keys_undo_and_link_reach_every_state_and_the_file_is_a_law(browser, folder, tmp_path):

@@ -9,13 +9,12 @@ from matplotlib.contour import QuadContourSet
 
 import tfarm
 from tests.plots.labels import complaints
-from tests.report.written import coarsen, report_with
+from tests.report.written import coarsen, report_with, values_of
 from tfarm.arm import Hub, HubFeedback
 from tfarm.arm.chain import Sampling
-from tfarm.assessment import stability_map
 from tfarm.assessment.card import margins_of
 from tfarm.case import Case
-from tfarm.dsp import Chain, load_chain
+from tfarm.dsp import Chain
 from tfarm.loop.continuous import frequency_above_mode
 from tfarm.loop.loci import loci
 from tfarm.loop.nyquist import nyquist
@@ -30,6 +29,9 @@ from tfarm.report.loop_section import (
 )
 from tfarm.report.page import ArmReport, GivenLaw, has_loop
 from tfarm.spectrum.gains import PAPER_GAINS, default_gains
+from tfarm.synthesis import stability_map
+from tfarm.synthesis.goals import Checked
+from tfarm.synthesis.good_region import RequiredGains
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 EPS = np.finfo(float).eps
@@ -88,7 +90,8 @@ def test_contours_reach_the_frame_and_words_overlap_nothing(lab, section):
         lab.y.low,
         lab.y.high,
     )
-    (contours,) = (each for each in figure.axes[0].collections if isinstance(each, QuadContourSet))
+    drawn = [each for each in figure.axes[0].collections if isinstance(each, QuadContourSet)]
+    (contours,) = [each for each in drawn if not each.filled]
     ends = [line[[0, -1], 1].min() for level in contours.allsegs for line in level if len(line) > 20]
     assert sum(low == lab.y.low for low in ends) > 3
     to_view = figure.axes[0].transData - figure.axes[0].transAxes
@@ -175,33 +178,24 @@ def test_the_map_shows_its_proof(coarse, section):
 # ------------------------------------------------------------ the same gains, sampled
 
 
-def test_the_star_is_stable_at_the_period_of_its_page(section):
-    """The best gains of a page are those of its own chain: both loops of their card are stable, as by the poles."""
-    assert all(each.brief.is_stable for each in ArmReport(LAB, Chain()).in_s)
-    labels = [text.get_text() for text in section.blocks[0].figure.legends[0].get_texts()]
-    assert any(label.startswith("best damping") and "stable when sampled every 10 ms" in label for label in labels)
-    quick = Chain(sampling=Sampling(period=2e-3))
-    for chain, period in ((Chain(), "10 ms"), (quick, "2 ms")):
-        section = recommended_section(ArmReport(LAB, chain))
-        assert [(each["loop"], each["finding"].split(",")[0]) for each in section.card] == [
-            ("continuous-time", "stable"),
-            (f"sampled, {period}", "stable"),
-        ]
-        gains = ArmReport(LAB, chain).in_s[1].law.gains
-        assert tfarm.result_card(LAB, gains, chain).sampled.grade == "poor"
-        assert section.title == "Gains of best damping"
-        assert "`tfarm design --objective margin`" in section.answer
-        assert f"K1 = {gains.K1:.4g}" in section.answer
-        phase = tfarm.margins(LAB, gains).in_band.phase_margin.value
-        assert float(section.card[0]["phase_margin_deg"]["value"]) == pytest.approx(abs(phase), rel=5e-4)
-    slow, fast = (ArmReport(LAB, each).in_s[1].law.gains.K1 for each in (Chain(), quick))
-    assert fast > slow
-
-
-def test_gains_without_a_poor_margin_are_recommended():
-    rig = ArmReport(tfarm.load("quanser-flexlink"), load_chain("quanser-flexlink"))
-    assert tfarm.result_card(rig.arm, rig.in_s[1].law, rig.chain).sampled.grade != "poor"
-    assert recommended_section(rig).title == "Recommended gains (best damping)"
+@pytest.mark.parametrize("period", [1e-2, 2e-3])
+def test_the_recommended_gains_are_good_at_the_period_of_their_page(section, period):
+    """Both loops of their card have the grade good; the table has its values, the map their mark in the region."""
+    report = ArmReport(LAB, Chain(sampling=Sampling(period=period)))
+    gains = report.in_s[1].law.gains
+    card = tfarm.result_card(LAB, gains, report.chain)
+    assert (card.sampled.grade, card.continuous.grade) == ("good", "good")
+    assert card.sampled.time_constant < tfarm.result_card(LAB, default_gains(LAB), report.chain).sampled.time_constant
+    page = recommended_section(report)
+    assert page.title == "Recommended gains"
+    assert f"K1 = {gains.K1:.4g}" in page.answer
+    values = dict(zip(values_of(page.blocks[0])["requirement"], values_of(page.blocks[0])["sampled"], strict=True))
+    assert values["PM>=45"] == pytest.approx(card.sampled.phase_margin.value, rel=1e-9)
+    if period == report.default.chain.sampling.period == 1e-2:
+        labels = [text.get_text() for text in section.blocks[0].figure.legends[0].get_texts()]
+        assert any(label.startswith("recommended gains") for label in labels)
+        assert any("the paper's, scaled" in label for label in labels)
+        assert any(label == "grade good in both loops, approximate" for label in labels)
 
 
 def test_intervals_are_short_facts_of_the_map(section):
@@ -213,6 +207,15 @@ def test_intervals_are_short_facts_of_the_map(section):
 
 
 def test_without_recommended_gains_there_is_a_sentence():
-    section = recommended_section(report_with(LAB, best=None))
-    assert section.answer.startswith("None: the search")
+    section = recommended_section(report_with(LAB, recommended=None))
+    assert section.answer.startswith("None: no gains of the map are stable")
     assert not section.card
+
+
+def test_gains_that_miss_a_requirement_are_not_recommended():
+    """The section names what is not met, and has no card of a controller."""
+    missed = Checked("PM>=45", LAB.name, 26.15, 7.901, 0.824)
+    section = recommended_section(report_with(LAB, recommended=RequiredGains(default_gains(LAB), (missed,))))
+    assert "not met there: PM>=45." in section.answer
+    assert not section.card
+    assert values_of(section.blocks[0])["sampled"] == [26.15]

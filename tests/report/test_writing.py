@@ -38,13 +38,14 @@ from tfarm.report import page as report_page
 from tfarm.report import write, writing
 from tfarm.report.blocks import TEMPLATES, explain_commands, prose, sheet, templates
 from tfarm.report.overview import Card, results, save_card
-from tfarm.report.page import ArmReport, GivenLaw, best
+from tfarm.report.page import ArmReport, GivenLaw
 from tfarm.report.response_sections import arm_section
 from tfarm.report.sections import PIECES, QUESTIONS, make_section, pieces_of
 from tfarm.report.trust import write_trust, written_proofs
 from tfarm.report.writing import navigation, read_records, write_index
 from tfarm.schema import Column, quantities, to_dict
 from tfarm.spectrum.gains import default_gains
+from tfarm.synthesis.stability_map import recommended_gains
 
 # ------------------------------------------------------------ the same bytes
 
@@ -179,7 +180,8 @@ def test_the_first_page_has_the_card_and_the_pictures_in_their_order(pages):
         assert f'href="{page}.html"' in heading
     shown = tfarm.modes(ARM, 5).natural_frequency[1:]
     assert [row[1] for row in Read(text).rows if row[0].isdigit()] == [f"{omega:.6g}" for omega in shown]
-    assert ('href="margins.html#margins-recommended"' in text) == (best(ARM, Chain()) is not None)
+    found = recommended_gains(ARM, Chain())
+    assert ('href="margins.html#margins-recommended"' in text) == (found is not None and found.is_met)
     assert tfarm.simulate(ARM, default_gains(ARM), duration=3.0).settling_time is None
     assert "<dt>settling time of the root moment</dt><dd>not settled within 3.000 s</dd>" in text
 
@@ -450,6 +452,29 @@ def test_each_law_has_a_row_and_one_in_z_no_continuous_verdict(tmp_path):
     assert [row["loop"] for row in rows] == ["sampled, 10 ms", "continuous-time", "sampled, 10 ms"]
     assert [row["finding"].split(",")[0] for row in rows] == ["stable"] * 3
     assert page.count('rowspan="3"') == 3
+
+
+def test_the_overview_says_what_limits_what_sampling_costs_and_what_is_next(tmp_path):
+    """Each number is that of a record: result card, modes, recommended gains."""
+    save_card(ArmReport(LAB, Chain()), tmp_path)
+    mode, sampling, following = json.loads((tmp_path / "card.json").read_text(encoding="utf-8"))["words"]
+    card = tfarm.result_card(LAB, default_gains(LAB))
+    phase = card.sampled.phase_margin
+    omega = tfarm.modes(LAB, 1).natural_frequency[-1]
+    assert f"phase margin limits the sampled loop: {phase.value:.4g} deg at {phase.omega:.4g}" in mode.replace(
+        "63.40", "63.4"
+    )
+    assert f"mode 1 ({omega:.4g} rad/s)" in mode
+    lost = card.continuous.delay_margin_periods - card.sampled.delay_margin_periods
+    assert f"({lost:.3g} lost)" in sampling
+    gains = recommended_gains(LAB, Chain()).law
+    assert f"`tfarm step sasaki2012-lab --K1 {gains.K1:g} --K2 {gains.K2:g}`" in following
+    time_constant = tfarm.result_card(LAB, gains).sampled.time_constant
+    assert f"{time_constant:.4g} s instead of {card.sampled.time_constant:.4g} s" in following
+    good = [GivenLaw(gains)]
+    save_card(ArmReport(LAB, Chain(), tuple(good)), tmp_path)
+    *_, following = json.loads((tmp_path / "card.json").read_text(encoding="utf-8"))["words"]
+    assert following.startswith("Next: `tfarm export`")
 
 
 def test_an_arm_without_hub_inertia_has_its_loops_and_the_reason_why_there_is_no_other(tmp_path):

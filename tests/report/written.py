@@ -16,7 +16,6 @@ from types import SimpleNamespace
 import tfarm
 from tests.hostile import LONG, NAME, PRINTED, Read
 from tfarm.arm import to_toml
-from tfarm.assessment import stability_map
 from tfarm.audit.published import validate
 from tfarm.dsp import Chain
 from tfarm.exported import live_loop
@@ -26,6 +25,7 @@ from tfarm.loop import sampled_modes as sampled_loci
 from tfarm.report import overview, page, writing
 from tfarm.report.page import ArmReport
 from tfarm.report.sections import PIECES
+from tfarm.synthesis import stability_map
 
 COARSE = (
     (stability_map, "GRID_COLUMNS", 48),

@@ -5,7 +5,7 @@ and in `dsp`); nothing is read off a raster.  Edges are rounded as they are seen
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -28,7 +28,7 @@ from tfarm.plots.labels import gains_words, law_words, name_axes, period_words
 from tfarm.plots.loop_function import draw_loops
 from tfarm.plots.style import (
     COLOURS,
-    DOTTED,
+    GOOD,
     GREY,
     INK,
     REGIONS,
@@ -43,6 +43,7 @@ from tfarm.plots.style import (
     safe,
     zero_line,
 )
+from tfarm.synthesis.good_region import GoodRegion
 from tfarm.synthesis.stability_map import StabilityMap
 
 # proven by the argument of the paper at C = 0
@@ -328,10 +329,8 @@ class MarkedLaw(NamedTuple):
 
 
 @picture(size=(9.0, 6.2), title=lambda data, *_: f"{data.arm.name}: stability region of both gains")
-def draw_stability_map(
-    data: StabilityMap, laws: Sequence[MarkedLaw], bounds: Mapping[str, tuple[float, float]], *, ax: Axes
-) -> None:
-    """Draw count, boundary, damping, sampled region, Lyapunov's frame, laws and the bounds of their search."""
+def draw_stability_map(data: StabilityMap, laws: Sequence[MarkedLaw], *, ax: Axes) -> None:
+    """Draw count, boundary, damping, sampled region, that of the grade good, Lyapunov's frame, and laws."""
     arm = data.arm
     x = data.x
     y = data.y
@@ -342,6 +341,8 @@ def draw_stability_map(
     if plane is not None:
         label = f"stable when sampled {period_words(plane.loop)} (first {plane.modes_used} modes)"
         draw_region(plane.x, plane.stable_intervals, label, ax, hatch="////")
+    if data.good is not None:
+        _draw_good(data.good, ax)
     if arm.is_uniform:
         _draw_lyapunov(arm.is_undamped, x, y, ax)
     for point, label, is_best in laws:
@@ -351,10 +352,15 @@ def draw_stability_map(
             mark = "*"
             size = 13.0
         mark_point(point, mark, ax, size, mew=1.0, label=label)
-    if bounds:
-        (a, b), (c, d) = (bounds[name] for name in PLANE)
-        frame = np.array([(a, c), (b, c), (b, d), (a, d), (a, c)])
-        ax.plot(*frame.T, color=GREY, lw=0.8, ls=DOTTED, label="bounds of its search")
+
+
+def _draw_good(found: GoodRegion, ax: Axes) -> None:
+    """Fill the gains whose margins have the grade good in both loops."""
+    words = "grade good in both loops, approximate"
+    if not found.met.any():
+        words += ": none found on the grid"
+    key_area(words, ax, facecolor=GOOD, alpha=0.55, lw=0)
+    ax.contourf(found.x, found.y, found.excess, (-np.inf, 0.0), colors=[GOOD], alpha=0.55, zorder=2.2)
 
 
 def _draw_lyapunov(is_undamped: bool, x: Axis, y: Axis, ax: Axes) -> None:

@@ -32,7 +32,6 @@ from tfarm.report.overview import results
 from tfarm.report.page import ArmReport, PageCase, has_loop, sign_words
 from tfarm.response.signals import Signals, sign_convention
 from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table, text
-from tfarm.synthesis.stability_map import DESIGNED_MODES
 
 # ------------------------------------------------------------ margins
 
@@ -96,13 +95,15 @@ def nyquist_section(report: ArmReport) -> PageSection:
     counts: dict[str, Nyquist] = {}
     for each in report.in_s:
         counts[each.title] = found = each.nyquist
+        # of the recommended gains the Bode plot has the numbers, and large arcs are those of the same signals
+        is_own = each.key != "recommended"
         linear = loop_function.nyquist.figure(found, name=each.name)
-        disc = loop_function.disc.figure(found, name=each.name)
+        data = curve_table(found) if is_own else ()
         stem = each.stem("nyquist")
-        blocks += [
-            picture_block("nyquist_plot", linear, stem=stem, data=curve_table(found), each=each, found=found),
-            picture_block("nyquist_disc", disc, stem=f"{stem}-disc", each=each, found=found),
-        ]
+        blocks.append(picture_block("nyquist_plot", linear, stem=stem, data=data, each=each, found=found))
+        if is_own:
+            disc = loop_function.disc.figure(found, name=each.name)
+            blocks.append(picture_block("nyquist_disc", disc, stem=f"{stem}-disc", each=each, found=found))
     own = any(found.unstable_open for found in counts.values())
     blocks.append(sheet("nyquist_count", across(counts), own=own))
     return PageSection(
@@ -173,19 +174,18 @@ def map_section(report: ArmReport) -> PageSection:
     """Return the stability regions of both gains, continuous and sampled."""
     arm = report.arm
     data = report.map
-    designed = report.best
     laws = []
     points = [report.gains.point]
-    bounds = {}
-    if designed is not None:
-        points.append(designed.law.point)
-        bounds = designed.bounds
+    if report.recommended is not None and report.recommended.is_met:
+        points.append(report.recommended.law.point)
     for each, point in zip(report.in_s, points, strict=True):
-        label = f"{each.title};\n{each.brief.short}"
-        laws.append(regions.MarkedLaw(point, label, each.key == "best"))
+        is_best = each.key == "recommended"
+        origin = "" if is_best else ", the paper's, scaled"
+        label = f"{each.name}{origin}: {each.gains};\n{each.brief.short}"
+        laws.append(regions.MarkedLaw(point, label, is_best))
     drawn = picture_block(
         "map",
-        regions.draw_stability_map.figure(data, laws, bounds),
+        regions.draw_stability_map.figure(data, laws),
         data=data.columns,
         found=data,
         arm=arm,
@@ -209,22 +209,27 @@ def continuous_interval_facts(report: ArmReport) -> list[Fact]:
 
 
 def recommended_section(report: ArmReport) -> PageSection:
-    """Return the gains that damp the first modes of the sampled loop best, with their result card.
+    """Return the fastest gains of the map that meet the requirements of the grade good, with their result card.
 
-    They are recommended unless a margin of the sampled loop is poor.
+    Where none meet them all, those nearest to it with the requirements that they do not meet.
     """
-    title = "Recommended gains (best damping)"
-    found = report.best
+    title = "Recommended gains"
+    found = report.recommended
     if found is None:
-        return PageSection(title=title, answer=prose("no_best_gains", modes=DESIGNED_MODES))
+        return PageSection(title=title, answer=prose("no_stable_gains"))
     gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), report.arm) for name in PLANE)
-    answer = prose("best_gains", found=found, modes=DESIGNED_MODES, gains=gains)
-    each = report.in_s[-1]
-    card = results(each.card, each.title)
-    # the last is the sampled one
-    if card[-1]["grade"] == "poor":
-        title = "Gains of best damping"
-    return PageSection(title=title, answer=answer, card=card)
+    answer = prose("recommended", found=found, gains=gains)
+    card: list[dict[str, Any]] = []
+    if found.is_met:
+        each = report.in_s[-1]
+        card = results(each.card, each.title)
+    rows = table(found.requirements, ("requirement", "sampled", "continuous"))
+    return PageSection(
+        title=title,
+        answer=answer,
+        card=card,
+        blocks=(sheet("requirements", rows, stem="requirements"),),
+    )
 
 
 # ------------------------------------------------------------ root loci

@@ -11,8 +11,8 @@ from tfarm.assessment.card import ResultCard
 from tfarm.errors import TfarmError
 from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import draw_card
-from tfarm.report.blocks import PICTURES, PageSection, SavedBlock, keep, prose
-from tfarm.report.page import ArmReport
+from tfarm.report.blocks import PICTURES, PageSection, SavedBlock, argument, keep, prose
+from tfarm.report.page import ArmReport, PageCase, is_preset
 from tfarm.schema import table, text, to_dict
 
 # a line
@@ -23,7 +23,8 @@ SHORT = {"gain_margin_db": "GM", "phase_margin_deg": "PM", "delay_margin_ms": "D
 class Card:
     """An arm as its pages and the table of arms show it; `picture` is empty where there is none.
 
-    `modes` are rows of `tfarm modes --json`, `loops` the loops of the summary of `tfarm sampled --json` in words.
+    `modes` are rows of `tfarm modes --json`, `loops` the loops of the summary of `tfarm sampled --json` in words;
+    `words` are the limits of each controller in sentences.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Card:
     modes: tuple[dict[str, Any], ...]
     loops: tuple[dict[str, Any], ...]
     notes: tuple[str, ...]
+    words: tuple[str, ...] = ()
 
 
 def save_card(report: ArmReport, folder: Path) -> None:
@@ -44,23 +46,43 @@ def save_card(report: ArmReport, folder: Path) -> None:
         picture = "card.svg"
     loops: list[dict[str, Any]] = []
     notes = [] if report.has_loop else [prose("no_loop", arm=arm)]
+    words: list[str] = []
     for each in () if arm.is_locked else report.cases:
         try:
             found = each.card
             loops += results(found, each.name if report.laws else each.title)
             notes += found.notes
+            words += limits_in_words(report, each)
         except TfarmError as error:
             notes.append(f"{each.name}: not determined, {error}.")
     # the first five; the page of modes has ten
     rows = [row for row in report.mode_list(5).modes if row.index > 0]
     first = table(rows, ("index", "natural_frequency", "natural_frequency_hz", "damping_ratio"))
-    shown = Card(arm.name, summary(report), picture, tuple(first), tuple(loops), tuple(dict.fromkeys(notes)))
+    shown = Card(
+        arm.name,
+        summary(report),
+        picture,
+        tuple(first),
+        tuple(loops),
+        tuple(dict.fromkeys(notes)),
+        tuple(words),
+    )
     keep(folder, "card", asdict(shown))
 
 
 def summary(report: ArmReport) -> str:
     """Return the arm in one sentence, and the laws that its page is about in another."""
     return prose("summary", arm=report.arm, laws=[each.own_name for each in report.cases if report.laws])
+
+
+def limits_in_words(report: ArmReport, each: PageCase) -> list[str]:
+    """Return the limiting mode of a case, the costs of sampling and the next step, a sentence or two each."""
+    name = each.own_name if len(report.cases) > 1 else ""
+    command = argument(report.arm.name, is_preset(report.arm, report.chain))
+    found = report.limits(each)
+    parts = ("limits_mode", "limits_sampling", "limits_next")
+    words = [prose(part, found=found, name=name, command=command) for part in parts]
+    return [sentence for sentence in words if sentence]
 
 
 def results(found: ResultCard, controller: str) -> list[dict[str, Any]]:

@@ -12,7 +12,6 @@ import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache
 from typing import NamedTuple
 
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, HubFeedback, Theory, load, presets
@@ -64,11 +63,13 @@ from tfarm.studies.candidates import (
     section_study,
     tuner_numbers,
 )
-from tfarm.synthesis.design import Design, design
+from tfarm.synthesis.good_region import RequiredGains
+from tfarm.synthesis.limits import LoopLimits, loop_limits
 from tfarm.synthesis.stability_map import (
     DESIGNED_MODES,
     StabilityMap,
     StableRegions,
+    recommended_gains,
     stability_map,
     stable_regions,
 )
@@ -303,10 +304,12 @@ class ArmReport(NamedTuple):
 
     @property
     def in_s(self) -> tuple[PageCase, ...]:
-        """The cases of continuous-time controllers: those given, else the default gains and the best ones."""
-        found = None if self.laws else self.best
-        more = () if found is None else (self.case_of(GivenLaw(found.law), "best damping", "best"),)
-        return tuple(each for each in (*self.cases, *more) if not each.law.is_discrete)
+        """The cases of continuous-time controllers: those given, else the default gains and those recommended."""
+        found = None if self.laws else self.recommended
+        shown = list(self.cases)
+        if found is not None and found.is_met:
+            shown.append(self.case_of(GivenLaw(found.law), "recommended gains", "recommended"))
+        return tuple(each for each in shown if not each.law.is_discrete)
 
     @property
     def bare(self) -> PageCase:
@@ -319,9 +322,18 @@ class ArmReport(NamedTuple):
         return not self.arm.is_locked if self.laws else has_loop(self.arm)
 
     @property
-    def best(self) -> Design | None:
-        """The gains of best damping; None where there are none."""
-        return best(self.arm, self.chain)
+    def recommended(self) -> RequiredGains | None:
+        """The fastest gains of the grade good, else those nearest to it; None where no gains are stable."""
+        return recommended_gains(self.arm, self.chain) if has_loop(self.arm) else None
+
+    def limits(self, each: PageCase) -> LoopLimits:
+        """Return the limits of a case; of the page's own gains with those recommended in their place."""
+        # a margin beyond them has no mode named
+        known = modes(self.arm, 12)
+        found = None if self.laws else self.recommended
+        if found is None or not found.is_met:
+            return loop_limits(each.card, known, found)
+        return loop_limits(each.card, known, found, result_card(self.arm, found.law, self.chain))
 
     @property
     def map(self) -> StabilityMap:
@@ -440,17 +452,6 @@ def gather() -> tuple[Sequence[AuditRow], Sequence[PublishedRow]]:
 def has_loop(arm: Arm) -> bool:
     """Whether both gains can be closed: the hub can turn, and has inertia."""
     return not (arm.is_locked or arm.has_massless_hub)
-
-
-@lru_cache(maxsize=16)
-def best(arm: Arm, chain: Chain) -> Design | None:
-    """The optimum of `tfarm design ARM`; None where no gains within its bounds hold, or the moment has no place."""
-    try:
-        found = design(arm, "damping", modes=DESIGNED_MODES, chain=chain) if has_loop(arm) else None
-    except ConvergenceError:
-        return None
-    # where the hub does not move there is no law to draw
-    return None if found is None or found.at_limit else found
 
 
 def sign_words(arm: Arm) -> str:

@@ -14,5 +14,7 @@ slew_measures   figures of the slew of a law, simulated
 goals           the least value of a quantity under requirements, and their exact values
 required        the search for a law that meets requirements, and conflicts where none does
 trade_off       the front of speed against robustness
+limits          the margin that limits a loop, and the costs of sampling
+good_region     gains K1 and K2 of the grade good, and the fastest of them
 stability_map   stability regions of the gains K1 and K2, and their map
 """

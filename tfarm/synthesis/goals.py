@@ -83,9 +83,9 @@ class Goal:
             np.log(np.maximum(value, LEAST_SIZE)) + slowness(judge, entries) + self._penalty(judge, sampled)
         )
 
-    def _penalty(self, judge: Any, sampled: LoopMeasures) -> Real:
-        """The weighted violations of requirements on the loops (laws,)."""
-        total = np.zeros(sampled.L.shape[0])
+    def violations(self, judge: Any, sampled: LoopMeasures) -> list[Real]:
+        """Return the violations (laws,) of each requirement of the loops, those of the sampled one first."""
+        found = []
         loops = [sampled]
         if judge.also:
             other = judge.also[0]
@@ -101,7 +101,14 @@ class Goal:
                     # the crossovers of L leave out how a late input changes what is read; these models have the shift
                     growth = [of.growth(of.poles(sampled.entries)).max(axis=1) for of in judge.delayed]
                     violation = np.maximum(violation, np.max(growth, axis=0) / GROWTH_OF_DELAY)
-                total += self.weight * np.maximum(violation, 0.0)
+                found.append(violation)
+        return found
+
+    def _penalty(self, judge: Any, sampled: LoopMeasures) -> Real:
+        """The weighted violations of requirements on the loops (laws,)."""
+        total = np.zeros(sampled.L.shape[0])
+        for violation in self.violations(judge, sampled):
+            total += self.weight * np.maximum(violation, 0.0)
         return total
 
     def excess(self, judges: Sequence[Any], law: AnyLaw) -> float:
@@ -209,8 +216,8 @@ class LoopValues(NamedTuple):
     continuous: dict[str, float] | None
 
 
-def _values_of(card: LoopCard) -> dict[str, float]:
-    """The measures of a card, the worst value of what is not defined."""
+def card_values(card: LoopCard) -> dict[str, float]:
+    """Return the measures of a card, the worst value of what is not defined."""
     gain = [each.value for each in (card.gain_margin, card.gain_reduction)]
     damping = card.least_damping
     return {
@@ -241,7 +248,7 @@ def exact_values(case: Case, slew: SlewMeasures | None) -> LoopValues:
             found.append(None)
             continue
         try:
-            found.append(_values_of(loop_card(name, case)))
+            found.append(card_values(loop_card(name, case)))
         except ConvergenceError:
             found.append({})
     sampled = found[0] or {}

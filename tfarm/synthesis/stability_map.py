@@ -33,6 +33,7 @@ from tfarm.records import frozen
 from tfarm.schema import Column
 from tfarm.spectrum.gains import default_gains
 from tfarm.spectrum.table import first_frequency
+from tfarm.synthesis.good_region import GoodRegion, RequiredGains, good_region
 from tfarm.synthesis.judge import damping_of
 from tfarm.synthesis.models import continuous_model
 from tfarm.synthesis.structures import Entry
@@ -139,7 +140,7 @@ class StabilityMap:
     `region` is the exact count on the coloured grid, `boundary` the exact boundary in the picture; `damping` (rows,
     columns) the least damping ratio of the first `DESIGNED_MODES` modes on the `coarse` grid, of every fourth value of
     each gain and the frame's.  `sampled` is the region of the loop sampled by a chain, None where that is not
-    determined.
+    determined; `good` that of the requirements of the grade good, None where no gains are stable.
     """
 
     arm: Arm
@@ -150,10 +151,11 @@ class StabilityMap:
     coarse: Plane
     damping: Real
     sampled: GainMap | None
+    good: GoodRegion | None
 
     @property
     def columns(self) -> list[Column]:
-        """The coarse grid with counts and damping, then the boundary with its frequencies."""
+        """The coarse grid with counts and damping, the boundary with its frequencies, the edge of the good region."""
         values = *np.meshgrid(*self.coarse.axes), self.coarse.unstable, self.damping
         rows: list[tuple[Any, ...]] = [
             ("grid", K1, K2, math.inf if count < 0 else int(count), ratio, "")
@@ -164,6 +166,9 @@ class StabilityMap:
             for K1, K2, omega in self.boundary.points.tolist()
             if not math.isnan(K1)
         ]
+        if self.good is not None:
+            for K1, intervals in zip(self.good.x.tolist(), self.good.stable_intervals, strict=True):
+                rows += [("good", K1, end, "", "", "") for interval in intervals for end in interval]
         rate = "_".join(f"{PLANE[0]} {shown_unit(PLANE[0], self.arm)}".replace("/", " ").split())
         keys = "what", rate, PLANE[1], "unstable_poles", "least_damping_ratio", "omega_rad_s"
         return [Column(key, of=of) for key, of in zip(keys, zip(*rows, strict=True), strict=True)]
@@ -178,8 +183,24 @@ def stability_map(arm: Arm, chain: Chain) -> StabilityMap:
     across = np.r_[x.low, found.x[2::4], x.high]
     up = np.r_[y.low, found.y[2::4], y.high]
     coarse = gain_map(arm, across, up)
-    sampled = sampled_region(arm, x, y, chain)
-    return StabilityMap(arm, x, y, found, boundary_lines(found, x, y), coarse, least_damping(coarse), sampled)
+    return StabilityMap(
+        arm,
+        x,
+        y,
+        found,
+        boundary_lines(found, x, y),
+        coarse,
+        least_damping(coarse),
+        sampled_region(arm, x, y, chain),
+        good_region(arm, x, y, chain),
+    )
+
+
+def recommended_gains(arm: Arm, chain: Chain) -> RequiredGains | None:
+    """Return the gains recommended by the map of an arm; None where none are stable."""
+    x = rate_axis(arm)
+    found = good_region(arm, x, moment_axis(arm, x), chain)
+    return None if found is None else found.recommended
 
 
 def least_damping(plane: Plane) -> Real:

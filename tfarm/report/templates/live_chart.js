@@ -1,6 +1,7 @@
 // Charts on a canvas: plots below each other, each with axes x and y {low, high, kind, constant, label, values} and marks over them.
 "use strict";
 const FORM = { linear: x => x, log: x => Math.log10(Math.max(x, 1e-300)) };
+const SHADE = 0.2; // of forbidden regions
 const CROSS = "cross", DOT = "dot", RING = "ring", BOX = "box", LEFT = 58, RIGHT = 10, TOP = 8, BELOW = 34, BETWEEN = 12; // pixels around the plots
 const formOf = ({ kind = "linear", constant }) => kind === "symlog" ? x => Math.sign(x) * Math.log1p(Math.abs(x) / constant) : FORM[kind];
 
@@ -115,6 +116,19 @@ const MARKS = {
       draw.globalAlpha = 1;
       draw.stroke();
     }
+  },
+  zone(draw, { zone, x: of, y: on, fill }, x, y) { // polygons, with holes where one lies in another
+    draw.beginPath();
+    for (const rows of zone) { rows.forEach((row, i) => { const at = [x.at(row[of]), clip(y.at(row[on]), -1e4, 1e4)]; if (i) draw.lineTo(...at); else draw.moveTo(...at); }); draw.closePath(); }
+    Object.assign(draw, { fillStyle: fill, globalAlpha: SHADE });
+    draw.fill("evenodd");
+    draw.globalAlpha = 1;
+  },
+  bar(draw, { bar, x: of, y: on, colour }, x, y) { // a broad line that a curve must not cross
+    Object.assign(draw, { strokeStyle: colour, lineWidth: 9, globalAlpha: 2 * SHADE });
+    draw.setLineDash([]);
+    line(draw, bar.map(row => [x.at(row[of]), y.at(row[on])]));
+    draw.globalAlpha = 1;
   },
   line(draw, { line: rows, x: of, y: on, by, colour, dash = [], width = 1.4 }, x, y) {
     Object.assign(draw, { strokeStyle: colour, lineWidth: width, lineJoin: "round" });

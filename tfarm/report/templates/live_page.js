@@ -5,7 +5,7 @@
   const loop = new LiveLoop(data), discrete = data.sampled_loop && new SampledLoop(data.sampled_loop), slew = data.slew && new Slew(data.slew);
   const damped = data.graded && new LiveLoop({ ...data, ...data.graded }), dampedZ = damped && discrete && new SampledLoop(data.graded.sampled_loop); // that margins are graded with
   const REST = 200, UNDOS = 100, PRECISE = 0.25, MOVING = 1, law = { ...data.start }; // ms without a move until everything is drawn in full; states that are kept; pixels of a chord at rest and in a move
-  const state = { plane: "poles", loop: "nyquist", vary: up || names[0], shown: "3" }, usual = { ...state }, past = [], colours = {};
+  const state = { plane: "poles", loop: "nyquist", vary: up || names[0], shown: "3", ratio: "0" }, usual = { ...state }, past = [], colours = {};
   const text = (id, words) => { const at = $(id); if (at && at.textContent !== words) at.textContent = words; };
   function dress() { // colours of the screen, light or dark
     const style = getComputedStyle(document.documentElement);
@@ -77,7 +77,7 @@
     text("z-ratio", Number.isFinite(now.zratio) ? general(100 * now.zratio, 4) : "-");
     text("s-constant", Number.isFinite(now.constant) ? general(now.constant, 4) : "-");
     text("z-constant", Number.isFinite(now.zconstant) ? general(now.zconstant, 4) : "-");
-    if (slew) { now.figures = slew.figures(now.run); const { settled } = now.figures; text("slew-settled", zword === "unstable" ? "unstable" : Number.isFinite(settled) ? general(settled, 5) : `not settled within ${general((now.run.n - 1) * slew.period, 5)} s`); }
+    if (slew) { now.figures ||= slew.figures(now.run); const { settled } = now.figures; text("slew-settled", zword === "unstable" ? "unstable" : Number.isFinite(settled) ? general(settled, 5) : `not settled within ${general((now.run.n - 1) * slew.period, 5)} s`); }
     $("scaled").hidden = !data.default || !names.every(name => law[name] === data.default[name]);
     names.forEach(name => { $(`slider-${name}`).value = place(data.axes[name], law[name]); if (document.activeElement !== $(name)) $(name).value = law[name]; });
     text("map-note", !law.Kp ? [across, up].map(name => `${name} = ${general(law[name], 4)}`).join(", ") : "The sampled region is known at Kp = 0 and not shown at this Kp; the verdict is that of the gains.");
@@ -153,18 +153,22 @@
     if (!now.margins) return [];
     return now.margins.gain.flatMap(factor => now.margins.crossovers.filter(row => row.w > 0 && Math.abs(row.factor / factor - 1) < 1e-6).map(({ w }) => ({ w, size: decibels(factor), low: Math.max(-dB(factor), -60), high: 0, colour: colours[grade(decibels(factor), data.limits.gain)] })));
   }
-  const half = loop => circle(-1, 0.5).map(({ x, y }) => loop === "nyquist" ? { x, y } : { angle: degrees([-x, -y]) - 180, dB: dB(Math.hypot(x, y)) });
+  const forbidden = forbiddenOf(data.limits), shaded = (bars, x, y) => bars.map(bar => ({ bar, x, y, colour: colours.poor }));
+  // At the crossovers of either loop: where |L| = 1 the angles, where L < 0 the sizes
+  const barsAt = (rows, ends) => shaded(rows.map(({ w }) => ends.map(y => ({ w, y }))), "w", "y"), both = key => [...(now.margins ? now.margins[key] : []), ...(now.zmargins ? now.zmargins[key].map(({ w }) => ({ w: w / discrete.period })) : [])].filter(row => row.w > 0);
   const turned = list => list.map(row => ({ ...row, angle: row.angle - 180 })), cursor = () => pointed.bode ? [{ rule: pointed.bode.w, along: "x", dash: [3, 3] }] : [];
   const sampledCurve = () => now.zcurve ? (now.zrows ||= {})[sharp()] ||= turned(now.zcurve(now.from)) : [], own = () => (now.rows ||= {})[sharp()] ||= turned(now.curve());
   const charts = {
     map: () => [{ ...plane, marks: [
       { area: now.areas || [], x: across, low: "low", high: "high", by: "part", fill: colours.stable },
+      { area: now.law.Kp ? [] : data.good || [], x: across, low: "low", high: "high", by: "part", fill: colours.good },
       { area: now.law.Kp ? [] : sampledAreas, x: "K1", low: "low", high: "high", by: "part", hatch: colours.stable, dash: [5, 3] },
       { line: now.edge || [], x: across, y: up, by: "piece", colour: colours.stable, width: 1 }, { line: proven, x: "K1", y: "K2", colour: colours.ink, dash: [2, 3] },
       { rule: now.law[across], along: "x" }, { rule: now.law[up] }, { points: [now.law], x: across, y: up, shape: DOT, colour: colours.ink },
     ] }],
     poles: () => [{
       x: { low: now.frame.x[0], high: now.frame.x[1], label: "Re s [1/s]" }, y: { low: now.frame.y[0], high: now.frame.y[1], label: "Im s [rad/s]" }, marks: [
+        { zone: undampedIn(now.frame, +state.ratio / 100), x: "re", y: "im", fill: colours.poor },
         { line: rays(now.frame), x: "re", y: "im", by: "ratio", colour: colours.grey, dash: [4, 3], width: 0.8 }, { words: rays(now.frame).filter(row => row.end), x: "re", y: "im", text: "ratio", colour: colours.grey },
         { rule: 0, along: "x" }, { line: now.locus || [], x: "re", y: "im", by: "piece", colour: colours.link, width: 1 }, { points: pointed.poles ? [pointed.poles] : [], x: "re", y: "im", shape: DOT, colour: colours.link },
         polePoints(now.near, 0, 1, s => s[0]),
@@ -173,6 +177,7 @@
     zplane: () => {
       const [wide, high] = equal("zplane", 1.25);
       return [{ x: { low: -wide, high: wide, label: "Re z" }, y: { low: -high, high, label: "Im z" }, marks: [
+        { zone: undampedOutside(wide, high, +state.ratio / 100), x: "re", y: "im", fill: colours.poor },
         { line: spirals(), x: "re", y: "im", by: "ratio", colour: colours.grey, dash: [4, 3], width: 0.8 }, { line: circle(0, 1), x: "x", y: "y", colour: colours.grey },
         { line: now.discs || [], x: "re", y: "im", by: "piece", colour: colours.link, width: 1 }, { points: pointed.zplane ? [pointed.zplane] : [], x: "re", y: "im", shape: DOT, colour: colours.link },
         polePoints((now.z || []).map(({ z, growth }) => ({ re: z[0], im: z[1], growth })), "re", "im", row => row.growth),
@@ -182,11 +187,11 @@
       const x = { low: now.from, high: (damped || loop).band, kind: "log", label: "frequency [rad/s]" }, phase = phaseMargin(), crossed = now.margins ? now.margins.crossed : [];
       return [
         { x, y: { low: -60, high: 40, label: "|L| [dB]" }, marks: [
-          { rule: 0 }, ...cursor(), { line: sampledCurve(), x: "w", y: "dB", colour: colours.grey, dash: [5, 3] }, { line: own(), x: "w", y: "dB", colour: colours.ink },
+          ...barsAt(both("crossovers"), forbidden.gain.map(row => row.dB)), { rule: 0 }, ...cursor(), { line: sampledCurve(), x: "w", y: "dB", colour: colours.grey, dash: [5, 3] }, { line: own(), x: "w", y: "dB", colour: colours.ink },
           ...gainStems().map(each => ({ stems: [each], colour: each.colour })), { points: crossed.map(({ w }) => ({ w, y: 0 })), x: "w", y: "y", shape: RING, radius: 3, colour: colours.ink },
         ] },
         { x, y: { low: -360, high: 0, label: "angle of L [deg]", values: [-360, -270, -180, -90, 0] }, marks: [
-          { rule: -180 }, ...cursor(), { line: sampledCurve(), x: "w", y: "angle", by: "branch", colour: colours.grey, dash: [5, 3] }, { line: own(), x: "w", y: "angle", by: "branch", colour: colours.ink },
+          ...barsAt(both("crossed"), [forbidden.phase[0].angle, forbidden.phase[forbidden.phase.length - 1].angle]), { rule: -180 }, ...cursor(), { line: sampledCurve(), x: "w", y: "angle", by: "branch", colour: colours.grey, dash: [5, 3] }, { line: own(), x: "w", y: "angle", by: "branch", colour: colours.ink },
           ...(phase ? [{ stems: [phase], colour: phase.colour }] : []),
         ] },
       ];
@@ -200,7 +205,8 @@
       const axes = nichols ? { x: { low: -360, high: 0, label: "angle of L [deg]", values: [-360, -270, -180, -90, 0] }, y: { low: -40 * zoom, high: 40 * zoom, label: "|L| [dB]" } }
         : { x: { low: -wide, high: wide, label: "Re L" }, y: { low: -high, high, label: "Im L" } };
       return [{ ...axes, marks: [
-        ...(nichols ? [{ rule: 0 }, { rule: -180, along: "x" }] : [{ line: circle(0, 1), x: "x", y: "y", colour: colours.grey, width: 1 }]), { line: half(of), x, y, colour: colours.grey, dash: [2, 3], width: 1 },
+        { zone: [forbidden.disc], x, y, fill: colours.poor }, ...shaded([forbidden.phase, forbidden.gain], x, y),
+        ...(nichols ? [{ rule: 0 }, { rule: -180, along: "x" }] : [{ line: circle(0, 1), x: "x", y: "y", colour: colours.grey, width: 1 }]),
         { line: sampledCurve(), x, y, by, colour: colours.grey, dash: [5, 3] }, { line: own(), x, y, by, colour: colours.ink },
         { points: [nichols ? { angle: -180, dB: 0 } : { x: -1, y: 0 }], x, y, shape: CROSS, colour: colours.ink }, { points: here, x, y, shape: DOT, colour: colours.link },
       ] }];
@@ -209,13 +215,18 @@
     slew: fine => {
       const found = slewSets(slew, now.run, fine ? Math.ceil(20 * slew.fastest(now.run) * slew.period / (2 * Math.PI)) : 0, $("slew").clientWidth);
       const x = { low: 0, high: (slew.n - 1) * slew.period, label: "time [s]" }, at = player ? [{ rule: player.time, along: "x" }] : [];
-      return [["angle", "y", "hub [rad]", [{ line: found.torque, x: "t", y: "reference", colour: colours.grey, dash: [5, 3] }]], ["torque", "torque", `${slew.drive.slice(0, 7)} [${slew.unit}]`], ["moment", "y", "root [N m]"], ["tip", "y", "tip [m]"]].map(([name, key, label, more = []]) => {
+      return [["angle", "y", "hub [rad]", [{ line: found.torque, x: "t", y: "reference", colour: colours.grey, dash: [5, 3] }]], ["torque", "torque", `${slew.drive.slice(0, 7)} [${slew.unit}]`], ["moment", "y", "root [N m]", settling(x.high)], ["tip", "y", "tip [m]"]].map(([name, key, label, more = []]) => {
         const values = found[name].map(row => row[key]), low = Math.min(...values), high = Math.max(...values), room = 0.06 * (high - low) || 1;
         return { x, y: { low: low - room, high: high + room, label }, marks: [...more, { line: found[name], x: "t", y: key, colour: colours.ink, width: 1.2 }, ...at] };
       });
     },
     sensor: () => sensor.plots(),
   };
+  // After the slew, farther from the final moment than its band
+  function settling(last) {
+    const { final, band } = now.figures ||= slew.figures(now.run), far = 1e3 * band, box = (low, high) => [[slew.rise, low], [last, low], [last, high], [slew.rise, high]].map(([t, y]) => ({ t, y }));
+    return band > 0 ? [{ zone: [box(final + band, final + far), box(final - far, final - band)], x: "t", y: "y", fill: colours.poor }] : [];
+  }
   // Half of each axis where both have one scale, the shorter one `least`
   function equal(name, least) {
     const [wide, high] = room(name);
@@ -235,7 +246,8 @@
   function notes() {
     const { margins } = now, gain = margins && gainStems().map(({ w, size }) => `gain margin ${general(size, 4)} dB at ${general(w, 4)} rad/s`), phase = limited(margins, 0), peak = limited(margins, 1);
     text("reading", margins ? [...gain, phase.at ? `phase margin ${general(Math.abs(phase.value), 4)}° ${phase.value < 0 ? "(lead)" : "(lag)"} at ${general(phase.at, 4)} rad/s` : ""].filter(Boolean).join("; ") : "An unstable loop has no margins.");
-    const circles = { nyquist: "Unit circle; dotted: Ms = 2. Shift and the wheel zoom.", nichols: "Cross: −1; dotted: Ms = 2. Shift and the wheel zoom.", sensitivity: "Thick: S; thin: T; dotted: 6 dB." };
+    const { gain: [least], phase: [angle], peak: [Ms] } = data.limits, shades = `Shaded: not good (${least} dB, ${angle}°, Ms ${Ms}).`;
+    const circles = { nyquist: `Unit circle. ${shades} Shift and the wheel zoom.`, nichols: `Cross: −1. ${shades} Shift and the wheel zoom.`, sensitivity: "Thick: S; thin: T; dotted: 6 dB." };
     text("loop-note", `${margins && peak.at ? `Ms ${general(peak.value, 4)} at ${general(peak.at, 4)} rad/s. ` : ""}${circles[state.loop]}`);
   }
 
@@ -277,7 +289,7 @@
   }
   function dressed() { // what is chosen
     for (const [id, key] of [["plane", "plane"], ["loop", "loop"]]) for (const button of $(id).children) button.setAttribute("aria-pressed", button.value === state[key]);
-    for (const id of ["vary", "shown"]) $(id).value = state[id];
+    for (const id of ["vary", "shown", "ratio"]) $(id).value = state[id];
     for (const id of ["poles", "zplane"]) $(id).hidden = id !== state.plane;
   }
   // All points, and then the curve of gains on the axis, the region and the locus, a few gains at a time; link and undo keep this state
@@ -334,7 +346,7 @@
   }
   function linked() {
     const pairs = new URLSearchParams(location.hash.slice(1)), found = { ...data.start, ...usual };
-    const choices = { plane: discrete ? ["poles", "zplane"] : ["poles"], loop: ["nyquist", "nichols", "sensitivity"], vary: names, shown: ["3", "5", "8", "12"] };
+    const choices = { plane: discrete ? ["poles", "zplane"] : ["poles"], loop: ["nyquist", "nichols", "sensitivity"], vary: names, shown: ["3", "5", "8", "12"], ratio: [...$("ratio").options].map(each => each.value) };
     for (const [name, value] of pairs) if (Object.hasOwn(law, name) && value && Number.isFinite(+value)) found[name] = +value; else if (Object.hasOwn(choices, name) && choices[name].includes(value)) found[name] = value;
     return found;
   }
@@ -424,9 +436,9 @@
     $(`slider-${name}`).addEventListener("input", event => set({ [name]: gainAt(data.axes[name], +event.target.value) }));
     $(name).addEventListener("change", event => { set({ [name]: event.target.value ? +event.target.value : NaN }); event.target.value = law[name]; });
   }
-  for (const [id, act] of Object.entries({ reset: () => set({ ...data.start, ...usual }), undo, copy, save })) $(id).addEventListener("click", act);
+  for (const [id, act] of Object.entries({ reset: () => set({ ...data.start, ...usual }), recommend: () => set({ ...data.recommended }), undo, copy, save })) $(id)?.addEventListener("click", act);
   for (const id of ["plane", "loop"]) $(id).addEventListener("click", event => { if (event.target.value) set({ [id]: event.target.value }); });
-  for (const id of ["vary", "shown"]) $(id).addEventListener("change", event => { now.locus = now.discs = null; set({ [id]: event.target.value }); });
+  for (const id of ["vary", "shown", "ratio"]) $(id).addEventListener("change", event => { now.locus = now.discs = null; set({ [id]: event.target.value }); });
   $("more").addEventListener("toggle", () => { if ($("more").open) { tables(); draw("sensor"); } });
   addEventListener("hashchange", () => { if (location.hash.slice(1) !== written) { written = location.hash.slice(1); set(linked()); } });
   addEventListener("resize", () => { set({}); draw("sensor"); });

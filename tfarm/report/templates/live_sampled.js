@@ -313,7 +313,7 @@ class Slew {
     let last = n - 1;
     while (last >= 0 && !(away[last] > band)) last -= 1;
     const first = last + 1, settled = stopped !== null || (first > 0 && 10 * (n - 1 - first) < n - 1) ? Infinity : Math.max(0, first * T - this.rise);
-    return { moment: top, torque: largest(torque.slice(0, n)), residual: stopped === null ? Math.sqrt(after.reduce((sum, x) => sum + x * x, 0) / after.length) : null, settled };
+    return { moment: top, torque: largest(torque.slice(0, n)), final, band, residual: stopped === null ? Math.sqrt(after.reduce((sum, x) => sum + x * x, 0) / after.length) : null, settled };
   }
 
   // The state at any time t [s]: amplitudes, rigid motion, and the torque that acts

@@ -61,6 +61,23 @@ function spirals() {
   })));
 }
 
+// What the requirements forbid: of L around -1, the disc of Ms, the angles at |L| = 1 and the sizes where L < 0; of poles a damping ratio below the least one
+function forbiddenOf({ gain: [least], phase: [angle], peak: [Ms] }) {
+  const turn = a => a * Math.PI / 180, angles = [...Array(19).keys()].map(k => -180 + angle * (k - 9) / 9), decibels = [-least, least];
+  return {
+    disc: circle(-1, 1 / Ms).map(({ x, y }) => ({ x, y, angle: degrees([-x, -y]) - 180, dB: dB(Math.hypot(x, y)) })),
+    phase: angles.map(a => ({ x: Math.cos(turn(a)), y: Math.sin(turn(a)), angle: a, dB: 0 })), gain: decibels.map(d => ({ x: -(10 ** (d / 20)), y: 0, angle: -180, dB: d })),
+  };
+}
+function undampedIn({ x, y }, ratio) {
+  const slope = ratio / Math.sqrt(1 - ratio * ratio);
+  return [[{ re: 0, im: 0 }, { re: -slope * y[1], im: y[1] }, { re: Math.max(x[1], 0), im: y[1] }, { re: Math.max(x[1], 0), im: 0 }]];
+}
+function undampedOutside(wide, high, ratio) {
+  const half = [...Array(49).keys()].map(k => { const q = Math.PI * k / 48, r = Math.exp(-ratio / Math.sqrt(1 - ratio * ratio) * q); return { re: r * Math.cos(q), im: r * Math.sin(q) }; });
+  return [[[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([a, b]) => ({ re: a * wide, im: b * high })), [...half, ...half.map(({ re, im }) => ({ re, im: -im })).reverse()]];
+}
+
 // The curve of gains with a pole on the axis, or on the unit circle: `at(w)` is a point of it; halved where it is coarse, cut where it leaves the map
 function edgeOf(at, frequencies, [across, up], axes) {
   const found = [], placed = row => [place(axes[across], row[across]), place(axes[up], row[up])], seen = ([x, y]) => x > -0.1 && x < 1.1 && y > -0.1 && y < 1.1;
