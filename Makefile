@@ -29,6 +29,7 @@ SURVEYS := \
 	loop.loci \
 	loop.law_counts \
 	synthesis.designs \
+	synthesis.agreement_design \
 	reduced.test_accuracy \
 	loop.settled \
 	loop.law_orders \
