@@ -19,7 +19,7 @@ import tfarm
 from tfarm.arm.chain import CHAIN_TABLES
 from tfarm.arm.law_tables import LawTable, SignalTable, WeightTable
 from tfarm.arm.materials import materials
-from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, StrictTable, file_keys
+from tfarm.arm.schema import PART_TABLES, SHAPE_TABLES, ArmTable, StrictTable, file_keys
 from tfarm.arm.stages import ARM_KEYS, STAGES
 from tfarm.assessment import step
 from tfarm.cli.running import whole_command
@@ -89,7 +89,8 @@ logging.getLogger("traitlets").setLevel(logging.WARNING)
 
 
 FILE_TABLES: dict[str, type[StrictTable]] = {
-    **ARM_TABLES,
+    "": ArmTable,
+    **PART_TABLES,
     **{f'link.section] with shape = "{shape}': table for shape, table in SHAPE_TABLES.items()},
     "law": LawTable,
     "law.SIGNAL": SignalTable,
@@ -209,7 +210,7 @@ def row_of(place: str, key: str, known: Any) -> list[str]:
     """Return the cells of one key of a file's table."""
     words = file_keys()[f"{place}.{key}"]
     made = known.annotation.__name__ if isinstance(known.annotation, type) else str(known.annotation)
-    is_table = key in ARM_TABLES or key == "section"
+    is_table = key in PART_TABLES or key == "section"
     kind = "table" if is_table else made.replace("typing.", "").replace("|", "or")
     default = "" if known.default is PydanticUndefined or is_table else f"`{known.default!r}`"
     return [f"`{key}`", words.label, words.unit, kind, default, words.help]

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.shared import docs_module
-from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES
+from tfarm.arm.schema import SHAPE_TABLES
 from tfarm.cli.running import commands_of, whole_command
 from tfarm.schema.glossary import declared_records
 
@@ -31,7 +31,7 @@ def test_every_command_and_option_is_on_the_page_of_commands(conf):
 
 def test_every_key_of_an_arm_file_is_on_its_page(conf):
     page = conf.arm_file_page()
-    for table in (*ARM_TABLES.values(), *SHAPE_TABLES.values(), *conf.FILE_TABLES.values()):
+    for table in (*SHAPE_TABLES.values(), *conf.FILE_TABLES.values()):
         assert all(f"| `{key}` |" in page for key in table.model_fields)
     assert "| `friction` | hub friction b | N m s/rad | float | `0.0` | viscous torque" in page
     assert "| `inertia` | hub inertia I_h | kg m^2 | float |  | about the axis" in page

@@ -12,7 +12,7 @@ from typer.exceptions import TyperException
 from tests.shell import run
 from tfarm.cli.running import commands_of, whole_command
 from tfarm.report import writing
-from tfarm.report.writing import PIECES
+from tfarm.report.sections import PIECES
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -72,7 +72,7 @@ def test_a_report_runs(tmp_path, capsys, monkeypatch):
         monkeypatch.setattr(writing, dear, lambda *_: None)
     monkeypatch.setattr(writing, "write_assets", lambda folder: (folder.mkdir(), (folder / "live.js").touch()))
     pieces = [each for each in PIECES if each.name in ("the arm", "root moment")]
-    monkeypatch.setattr("tfarm.report.writing.PIECES", pieces)
+    monkeypatch.setattr("tfarm.report.sections.PIECES", pieces)
     code, out, err = run(capsys, "report", "sasaki2012-lab", "--out", "pages")
     assert (code, out.strip()) == (0, "pages/index.html")
     assert err == "tfarm: written first: pages/sasaki2012-lab/index.html; the other pages follow\n"

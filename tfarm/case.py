@@ -46,10 +46,11 @@ class Case:
         if law.input not in (None, self.arm.input):
             # the record refuses an input that the arm has no motor for
             object.__setattr__(self, "arm", replace(self.arm, input=law.input))  # type: ignore[arg-type]
-        gains = law.gains if _follows_all(law) else None
-        if gains is not None:
-            usual = Law.of_gains(gains)
-            law = usual if law.name == Law.name else replace(usual, name=law.name)
+        if law.gains is not None and _follows_all(law):
+            name = law.name
+            law = Law.of_gains(law.gains)
+            if name != Law.name:
+                law = replace(law, name=name)
         object.__setattr__(self, "law", law)
         object.__setattr__(self, "chain", chain_or_usual(self.chain))
 
@@ -132,17 +133,23 @@ def full_law(law: AnyLaw) -> Law:
     if law.gains is None:
         return law
     references = AT_HUB if _follows_all(law) else law.references
-    return Law(
-        {gain.output: law.gains[gain.name] for gain in GAINS}, name="gains at the hub", references=references
-    )
+    entries = {gain.output: law.gains[gain.name] for gain in GAINS}
+    return Law(entries, name="gains at the hub", references=references)
 
 
 def tracked(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
     """Return the arm with the input of a controller, and that as gains at the hub if those follow all references."""
     case = Case(arm, law)
-    return case.arm, case.gains if case.gains is not None and _follows_all(case.law) else law
+    if case.gains is not None and _follows_all(case.law):
+        law = case.gains
+    return case.arm, law
 
 
 # names that this module, a room then, had up to version 1.0
-_MOVED = ("ComparedSide", "Comparison", "LoopCard", "ResultCard", "compare", "loop_function", "result_card")
-__getattr__ = moved(__name__, dict.fromkeys(_MOVED, "tfarm.assessment"))
+__getattr__ = moved(
+    __name__,
+    dict.fromkeys(
+        ("ComparedSide", "Comparison", "LoopCard", "ResultCard", "compare", "loop_function", "result_card"),
+        "tfarm.assessment",
+    ),
+)

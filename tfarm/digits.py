@@ -6,10 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
 
-SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # of a decimal number that a double preserves
 DOUBLE_DIGITS = 15
-# outside, numbers have powers of ten
 # from the values of a column to its cells
 CellsOf = Callable[[Sequence[Any]], Sequence[str]]
 
@@ -38,17 +36,20 @@ def significant(x: float, digits: int) -> str:
     # outside, numbers have powers of ten
     least_plain = 1e-3
     most_plain = 1e7
-    if x and not least_plain <= abs(x) < most_plain:
+    if not x:
+        return "0"
+    if not least_plain <= abs(x) < most_plain:
         return scientific(x, digits)
-    if x:
-        return _typeset(f"{x:.{max(0, digits - 1 - _exponent(x, digits))}f}")
-    return "0"
+    decimals = max(0, digits - 1 - _exponent(x, digits))
+    return _typeset(f"{x:.{decimals}f}")
 
 
 def plain(x: float, digits: int = 10) -> str:
     """Return `x` without trailing zeros: 2766.7, 6.8944 × 10¹⁰."""
     number, times, power = significant(x, digits).partition(" ×")
-    return f"{number.rstrip('0').rstrip('.') if '.' in number else number}{times}{power}"
+    if "." in number:
+        number = number.rstrip("0").rstrip(".")
+    return f"{number}{times}{power}"
 
 
 def scientific(x: float, digits: int) -> str:
@@ -93,7 +94,8 @@ def round_to_error(value: float, error: float, most: int) -> str:
 
 def how_many(count: float, what: str) -> str:
     """Return a number and its noun: no poles, 1 pole, 2 poles."""
-    return f"{plain(count) if count else 'no'} {what}{'s' * (count != 1)}"
+    number = plain(count) if count else "no"
+    return f"{number} {what}{'s' * (count != 1)}"
 
 
 def join_words(words: Sequence[str]) -> str:
@@ -106,12 +108,17 @@ def join_words(words: Sequence[str]) -> str:
 def powers(text: str) -> str:
     """Return a text with powers of ten: 1.8 × 10⁻⁹ for 1.8e-9."""
     number = r"(?<![\w.])(\d(?:\.\d+)?)e([-+]?\d{1,3})(?!\w|\.\d)"
-    return re.sub(number, lambda found: f"{found[1]} × 10{str(int(found[2])).translate(SUPERSCRIPT)}", text)
+    return re.sub(number, lambda found: f"{found[1]} × 10{_superscript(str(int(found[2])))}", text)
 
 
 def unit(text: str) -> str:
     """Return a unit with exponents: m² for m^2."""
-    return re.sub(r"\^(-?\d)", lambda power: power[1].translate(SUPERSCRIPT), text)
+    return re.sub(r"\^(-?\d)", lambda power: _superscript(power[1]), text)
+
+
+def _superscript(text: str) -> str:
+    """Return a whole number as an exponent."""
+    return text.translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def _exponent(x: float, digits: int) -> int:
@@ -121,4 +128,6 @@ def _exponent(x: float, digits: int) -> int:
 
 def _typeset(text: str) -> str:
     """Return a number with a true minus sign, none of zero, and a power of ten."""
-    return powers(text if text.strip("-0.") else text.lstrip("-")).replace("-", "−").replace("inf", "∞")
+    if not text.strip("-0."):
+        text = text.lstrip("-")
+    return powers(text).replace("-", "−").replace("inf", "∞")

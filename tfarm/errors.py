@@ -2,6 +2,7 @@
 
 import difflib
 import os
+import re
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -55,7 +56,9 @@ def name_file(file: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except ParameterError as error:
-        raise (error if error.file else error.in_file(file)) from None
+        if not error.file:
+            error = error.in_file(file)
+        raise error from None
 
 
 class ConvergenceError(TfarmError):
@@ -63,7 +66,9 @@ class ConvergenceError(TfarmError):
 
     def __init__(self, message: str, best: Any, residual: Any) -> None:
         super().__init__(message, best, residual)
-        self.message, self.best, self.residual = message, best, residual
+        self.message = message
+        self.best = best
+        self.residual = residual
 
     def __str__(self) -> str:
         return self.message
@@ -77,7 +82,10 @@ def did_you_mean(word: str, choices: Iterable[str]) -> str:
     """Return the remedy for a misspelt word: the nearest choices (`close_to`), if any, and all of them."""
     known = list(choices)
     near = close_to(word, known)
-    hint = "did you mean " + " or ".join(f'"{choice}"' for choice in near) + "? " if near else ""
+    hint = ""
+    if near:
+        choice = " or ".join(f'"{each}"' for each in near)
+        hint = f"did you mean {choice}? "
     return f"{hint}known are: {list_within(known, 400 - len(hint))}"
 
 
@@ -93,20 +101,15 @@ def unknown_key(word: str, known: Iterable[str]) -> str:
     """Return the remedy for an unknown key of a file: why its physics is not modelled, else the nearest of `known`."""
     not_modelled = {
         "gravity": "the arm moves in a horizontal plane",
-        "coriolis": "the rotation is slow compared with the first mode",
-        "centrifugal": "the rotation is slow compared with the first mode",
+        "coriolis|centrifugal": "the rotation is slow compared with the first mode",
         "torsion": "the arm bends in the plane of rotation alone",
-        "backlash": "joints and gears are linear",
-        "hysteresis": "joints and gears are linear",
-        "coulomb": "friction is viscous, [hub] friction",
-        "breakaway": "friction is viscous, [hub] friction",
-        "stiction": "friction is viscous, [hub] friction",
-        "dry_friction": "friction is viscous, [hub] friction",
+        "backlash|hysteresis": "joints and gears are linear",
+        "coulomb|breakaway|stiction|dry_friction": "friction is viscous, [hub] friction",
         "temperature": "all numbers are constant",
         "aerodynamic": "damping is that of the link, the joints and the hub",
     }
     for physics, reason in not_modelled.items():
-        if physics in word.lower():
+        if re.search(physics, word.lower()):
             return f"not modelled: {reason}; leave it out"
     return f"unknown key; {did_you_mean(word, known)}"
 

@@ -27,7 +27,6 @@ if sys.platform != "win32":
 
 # in the place of a path, as other programs have it; a file of that name is written as a/-
 STANDARD_OUTPUT = "-"
-UNREADABLE = "cannot be read ({}); check the path and its permissions"
 
 
 def read_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -> bytes:
@@ -35,7 +34,7 @@ def read_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -
 
     Raises ParameterError, naming `key`; `what` names the kind of file in the remedy ("a .toml file").
     """
-    with open_file(path, most, key=key, what=what) as file, _refused(key, path, UNREADABLE):
+    with open_file(path, most, key=key, what=what) as file, _name_errors(key, path):
         data = file.read(most + 1)
     # of a file that grows, or that has no size
     _check_size(path, len(data), most, what)
@@ -45,18 +44,20 @@ def read_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -
 @contextmanager
 def open_file(path: str | os.PathLike[str], most: int, *, key: str, what: str) -> Iterator[IO[bytes]]:
     """Yield what `read_file` reads as an open file."""
-    with _refused(key, path, UNREADABLE):
+    with _name_errors(key, path):
         status = os.stat(path)
-    found = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
-    require(stat.S_ISREG(status.st_mode), key, os.fspath(path), f"is {found}; give {what}")
+    kind = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
+    require(stat.S_ISREG(status.st_mode), key, os.fspath(path), f"is {kind}; give {what}")
     _check_size(path, status.st_size, most, what)
-    with _refused(key, path, UNREADABLE):
-        file = open(path, "rb")  # noqa: SIM115  # closed below
+    with _name_errors(key, path):
+        # closed below
+        file = open(path, "rb")  # noqa: SIM115
     with file:
         yield file
 
 
 def _check_size(path: str | os.PathLike[str], size: int, most: int, what: str) -> None:
+    """Raise ParameterError for a file of more bytes."""
     require(size <= most, "size in bytes", size, f"{what} of at most {most} is read", os.fspath(path))
 
 
@@ -87,7 +88,7 @@ def write_file(path: Path, content: bytes, *, key: str) -> None:
     ParameterError, naming `key`, where that cannot be done, and BrokenPipeError where the reader of a pipe has left.
     """
     number = _descriptor(path)
-    with _refused(key, path, "cannot be written ({}); choose another"):
+    with _name_errors(key, path, "cannot be written ({}); choose another"):
         if number is None and not (path.exists() and not path.is_file()):
             _replace(Path(os.path.realpath(path)), content)
             return
@@ -115,13 +116,13 @@ def temporary_folder(place: Path) -> Iterator[Path]:
 
 @contextmanager
 def place_in(out: Path, key: str, names: Sequence[str] = ()) -> Iterator[Path]:
-    """A temporary folder in `out`, gone afterwards; what was made for it goes too if the work fails.
+    """Yield a temporary folder in `out`, gone afterwards; what was made for it goes too if the work fails.
 
     Raises ParameterError, naming `key`, before any work where `out` or a folder of these names in it cannot be written.
     """
     folders = [out, *(out / name for name in names)]
     try:
-        with _made(folders):
+        with _make_folders(folders):
             for folder in folders:
                 # which fails where it cannot be written to
                 with temporary_folder(folder):
@@ -137,11 +138,11 @@ def place_in(out: Path, key: str, names: Sequence[str] = ()) -> Iterator[Path]:
 
 
 @contextmanager
-def _made(folders: Sequence[Path]) -> Iterator[None]:
+def _make_folders(folders: Sequence[Path]) -> Iterator[None]:
     """Make folders, of which those that are new and empty are removed afterwards, also where the process is stopped."""
-    missing = [
-        part for folder in folders for part in (*reversed(folder.parents), folder) if not part.exists()
-    ]
+    missing: list[Path] = []
+    for folder in folders:
+        missing += (each for each in (*reversed(folder.parents), folder) if not each.exists())
 
     def remove_empty() -> None:
         for folder in reversed(missing):
@@ -158,7 +159,7 @@ def _made(folders: Sequence[Path]) -> Iterator[None]:
 
 
 def move_into(made: Path, folder: Path) -> None:
-    """Every file replaced in one step each, pages last, so that a page never names a file that is not there."""
+    """Replace every file in one step each, pages last, so that a page never names a file that is not there."""
     files = [file.relative_to(made) for file in made.rglob("*") if file.is_file()]
     for file in sorted(files, key=lambda file: (file.suffix == ".html", file.as_posix())):
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
@@ -166,7 +167,11 @@ def move_into(made: Path, folder: Path) -> None:
 
 
 @contextmanager
-def _refused(key: str, path: str | os.PathLike[str], remedy: str) -> Iterator[None]:
+def _name_errors(
+    key: str,
+    path: str | os.PathLike[str],
+    remedy: str = "cannot be read ({}); check the path and its permissions",
+) -> Iterator[None]:
     """Turn errors of the system into ParameterError with their reason in the remedy; a broken pipe stays one."""
     try:
         yield
@@ -214,13 +219,13 @@ def _temporary(folder: Path, prefix: str, suffix: str, make: Callable[[Path], ob
     # of a folder that cannot be listed, and may yet be written to
     with suppress(PermissionError):
         for name in filter(pattern.fullmatch, os.listdir(folder)):
-            with suppress(OSError), _locked(folder / name, wait=False):
+            with suppress(OSError), _hold_lock(folder / name, wait=False):
                 _remove(folder / name)
     while True:
         path = folder / f"{prefix}{secrets.token_hex(4)}{suffix}"
         with undone_if_stopped(partial(_remove, path)):
             make(path)
-            with _locked(path, wait=True):
+            with _hold_lock(path, wait=True):
                 try:
                     if path.exists():
                         yield path
@@ -230,7 +235,7 @@ def _temporary(folder: Path, prefix: str, suffix: str, make: Callable[[Path], ob
 
 
 @contextmanager
-def _locked(path: Path, *, wait: bool) -> Iterator[None]:
+def _hold_lock(path: Path, *, wait: bool) -> Iterator[None]:
     """Hold the lock of a temporary file or folder; none where it is gone, or where the file system has no locks.
 
     Raises BlockingIOError where another process has it and `wait` is false.
@@ -245,7 +250,8 @@ def _locked(path: Path, *, wait: bool) -> Iterator[None]:
         return
     try:
         with suppress(*[OSError] * wait):
-            fcntl.flock(handle, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+            how = fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB
+            fcntl.flock(handle, how)
         yield
     finally:
         os.close(handle)
@@ -258,10 +264,10 @@ def locked_folder(path: Path, *, key: str) -> Iterator[None]:
     Raises ParameterError where another process has it.
     """
     with ExitStack() as stack:
-        with _refused(key, path, "cannot be made ({}); choose another"):
-            stack.enter_context(_made([path]))
+        with _name_errors(key, path, "cannot be made ({}); choose another"):
+            stack.enter_context(_make_folders([path]))
         try:
-            stack.enter_context(_locked(path, wait=False))
+            stack.enter_context(_hold_lock(path, wait=False))
         except BlockingIOError:
             raise ParameterError(
                 key=key, value=os.fspath(path), remedy="another run has it: wait for its end"
@@ -270,6 +276,7 @@ def locked_folder(path: Path, *, key: str) -> Iterator[None]:
 
 
 def _remove(path: Path) -> None:
+    """Remove a temporary file or folder, if it is there."""
     # of a folder alone, and not of a link to one
     shutil.rmtree(path, ignore_errors=True)
     with suppress(OSError):

@@ -10,10 +10,9 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
-from itertools import chain
 from typing import IO, Any, cast
 
 import numpy as np
@@ -21,17 +20,15 @@ import numpy as np
 from tfarm.errors import ParameterError
 from tfarm.stopping import undone_if_stopped
 
-LONGEST = (
-    # seconds, of a file or a batch of rows: the largest file takes 8 s of a processor, which others may share
-    120
-)
+# seconds, of a file or a batch of rows: the largest file takes 8 s of a processor, which others may share
+LONGEST = 120
 # the system's, where it has one
 alarm: Callable[[int], object] = getattr(signal, "alarm", lambda _: None)
 
 
 @contextmanager
 def read_by_child(kind: str, path: str | os.PathLike[str], *, key: str, remedy: str) -> Iterator[IO[bytes]]:
-    """Yield the output of a process that reads a file of that kind, a key of `READERS`.
+    """Yield the output of a process that reads a file of that kind: mat, uff or parquet.
 
     Raises ParameterError, naming `key`, where it ends with an error, by a signal or at a limit.
     """
@@ -67,18 +64,20 @@ def of_mat(path: str) -> Iterator[memoryview]:
     """Return the numbers of a .mat file (up to version 7.2); those of a structure as "structure.name"."""
     from scipy.io import loadmat
 
-    found = loadmat(path, appendmat=False, squeeze_me=False, struct_as_record=True)
-    return pack_arrays(
-        dict(each for item in found.items() if item[0][:2] != "__" for each in _numbers(*item))
-    )
+    found: dict[str, Any] = {}
+    for name, value in loadmat(path, appendmat=False, squeeze_me=False, struct_as_record=True).items():
+        if not name.startswith("__"):
+            found |= _numbers(name, value)
+    return pack_arrays(found)
 
 
 def _numbers(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     """Yield the dense arrays of a variable; none of a cell or an object."""
     # of a sparse matrix
     value = value.toarray() if hasattr(value, "toarray") else np.asarray(value)
-    for each in value.dtype.names or () if value.size == 1 else ():
-        yield from _numbers(f"{name}.{each}", value[each].item())
+    if value.size == 1:
+        for each in value.dtype.names or ():
+            yield from _numbers(f"{name}.{each}", value[each].item())
     if value.dtype.kind in "biufcU":
         yield name, value
 
@@ -100,7 +99,8 @@ def of_uff(path: str) -> Iterator[memoryview]:
 def pack_arrays(found: dict[str, Any]) -> Iterator[memoryview]:
     """Yield the names of arrays, then each of them."""
     for each in (np.array([*found], dtype=str), *found.values()):
-        np.save(stream := io.BytesIO(), each, allow_pickle=False)
+        stream = io.BytesIO()
+        np.save(stream, each, allow_pickle=False)
         yield stream.getbuffer()
 
 
@@ -109,20 +109,22 @@ def of_parquet(path: str) -> Iterator[bytes]:
     from pyarrow.parquet import ParquetFile  # type: ignore[import-untyped]
 
     with ParquetFile(path) as file:
-        batches = (
-            zip(*(column.to_pylist() for column in batch.columns), strict=True)
-            for batch in file.iter_batches()
-        )
-        for rows in chain([[file.schema_arrow.names]], batches):
-            csv.writer(text := io.StringIO()).writerows(rows)
-            yield text.getvalue().encode()
+        yield _csv_lines([file.schema_arrow.names])
+        for batch in file.iter_batches():
+            columns = (column.to_pylist() for column in batch.columns)
+            yield _csv_lines(zip(*columns, strict=True))
 
 
-READERS: dict[str, Callable[[str], Iterator[Any]]] = {"mat": of_mat, "uff": of_uff, "parquet": of_parquet}
+def _csv_lines(rows: Iterable[Any]) -> bytes:
+    """Return rows as lines of CSV."""
+    text = io.StringIO()
+    csv.writer(text).writerows(rows)
+    return text.getvalue().encode()
 
 
 def main(kind: str, path: str) -> None:
     """Write the content of a file to standard output; the last line of an error is its reason."""
+    readers: dict[str, Callable[[str], Iterator[Any]]] = {"mat": of_mat, "uff": of_uff, "parquet": of_parquet}
     # of a system without limits, or with a tighter one
     with suppress(ImportError, ValueError, OSError):
         import resource
@@ -136,7 +138,7 @@ def main(kind: str, path: str) -> None:
         # a reader may print
         os.dup2(2, 1)
         alarm(LONGEST)
-        for each in READERS[kind](path):
+        for each in readers[kind](path):
             # while it waits to be taken
             alarm(0)
             output.write(each)

@@ -19,17 +19,17 @@ from tfarm.stopping import SIGNALS, undone_if_stopped
 
 BLAS = "OPENBLAS_NUM_THREADS"
 
-Task = TypeVar("Task")
+Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 
 def share_tasks(
-    tasks: Iterable[tuple[Task, Callable[[], Result]]],
+    tasks: Iterable[tuple[Job, Callable[[], Result]]],
     count: int,
-    begun: Callable[[Sequence[Task]], object] = lambda _: None,
+    begun: Callable[[Sequence[Job]], object] = lambda _: None,
     *,
     joins: bool = False,
-) -> Iterator[tuple[Task, Result]]:
+) -> Iterator[tuple[Job, Result]]:
     """Yield each task with its result as it comes, by `count` processes, or by this one for a count of 1.
 
     Where this one `joins`, it is one of them: a process less to start.
@@ -43,7 +43,7 @@ def share_tasks(
         return
     # which may make each task only when there is a process for it
     waiting = iter(tasks)
-    running: dict[Future[Result], Task] = {}
+    running: dict[Future[Result], Job] = {}
     others = count - joins
     with _pool(others) as pool:
 
@@ -60,9 +60,13 @@ def share_tasks(
             begin(count)
             if own is None and not running:
                 return
-            begun([*running.values()][:others] + ([] if own is None else [own[0]]))
-            if own is not None:
-                yield own[0], own[1]()
+            now = [*running.values()][:others]
+            if own is None:
+                begun(now)
+            else:
+                task, call = own
+                begun([*now, task])
+                yield task, call()
             for future in wait(running, None if own is None else 0.0, FIRST_COMPLETED).done:
                 task = running.pop(future)
                 yield task, future.result()

@@ -3,7 +3,7 @@
 A repr begins with the finding: the entries or properties of a record with a name in `SHOWN_FIRST`.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from fractions import Fraction
 from functools import cached_property, partial, wraps
@@ -18,8 +18,6 @@ _AnyRecord = TypeVar("_AnyRecord")
 
 # the finding
 SHOWN_FIRST = ("verdict", "word", "text", "finding", "unstable", "worst_error")
-# characters of a repr: a line or two of a terminal
-LONGEST_REPR = 200
 # types without arrays
 PLAIN = frozenset({float, int, str, bool, type(None), Fraction})
 # another in each process, as the hash of every record with a text
@@ -101,10 +99,12 @@ def read_only(value: Any) -> Any:
 
 
 def _read_only_result(function: Any) -> Any:
+    """Return a function of a record whose result is read-only."""
     return wraps(function)(lambda self: read_only(function(self)))
 
 
 def _equal(self: Any, other: Any) -> Any:
+    """Return whether two records are of one class with the same entries."""
     if type(self) is not type(other):
         return NotImplemented
     return all(
@@ -147,9 +147,14 @@ def _key(value: Any) -> Any:
 
 
 def _repr(self: Any) -> str:
+    """Return the class and the shown entries in a line or two of a terminal."""
     text = ", ".join(f"{name}={shown}" for name, shown in _entries(self))
-    text = text if len(text) <= LONGEST_REPR else f"{text[: LONGEST_REPR - 4]} ..."
-    return f"{type(self).__name__}({text})"
+    return f"{type(self).__name__}({_cut(text, 200)})"
+
+
+def _cut(text: str, longest: int) -> str:
+    """Return a text in at most that many characters."""
+    return text if len(text) <= longest else f"{text[: longest - 4]} ..."
 
 
 def _repr_html(self: Any) -> str:
@@ -161,14 +166,14 @@ def _repr_html(self: Any) -> str:
 
 def _entries(self: Any) -> Iterator[tuple[str, str]]:
     """Yield the shown names and texts: the finding, those of `as_typed`, then the fields other than defaults."""
-    found = _found(self)
+    found = _finding_names(self)
     for name in found:
-        yield name, _shown(getattr(self, name), 100)
+        yield name, _short_text(getattr(self, name), 100)
     if hasattr(type(self), "as_typed"):
         yield from self.as_typed()
     for each in fields(self):
         if each.repr and each.name not in found and not _is_default(self, each):
-            yield each.name, _shown(getattr(self, each.name))
+            yield each.name, _short_text(getattr(self, each.name))
 
 
 def _is_default(self: Any, entry: Field[Any]) -> bool:
@@ -177,7 +182,7 @@ def _is_default(self: Any, entry: Field[Any]) -> bool:
     return default is not MISSING and _same(getattr(self, entry.name), default)
 
 
-def _found(self: Any) -> list[str]:
+def _finding_names(self: Any) -> list[str]:
     """Return the names in `SHOWN_FIRST` of a record's fields, and of its properties that are no records themselves."""
     own = self.__dataclass_fields__
     # a record with a word has no other verdict
@@ -185,28 +190,28 @@ def _found(self: Any) -> list[str]:
     return [name for name in names if name in own or not is_dataclass(getattr(self, name, self))]
 
 
-def _shown(value: Any, longest: int = 60) -> str:
+def _short_text(value: Any, longest: int = 60) -> str:
     """Return an entry in a few characters: six digits of a number, an array's shape; a record's finding or name."""
     # numbers of an array or a list that are shown
     few = 3
     if isinstance(value, np.ndarray):
-        is_short = value.ndim == 1 and value.size <= few
-        if is_short:
-            return f"[{', '.join(map(_shown, value.tolist()))}]"
+        if value.ndim == 1 and value.size <= few:
+            return f"[{', '.join(map(_short_text, value.tolist()))}]"
         return f"<array {value.shape}>"
     if isinstance(value, float | complex):
         return f"{value:.6g}"
     if isinstance(value, dict):
-        is_short = 0 < len(value) <= few and all(isinstance(each, float) for each in value.values())
-        return (
-            f"<{', '.join(f'{key}={_shown(each)}' if is_short else str(key) for key, each in value.items())}>"
-        )
+        words: Iterable[str] = map(str, value)
+        if 0 < len(value) <= few and all(isinstance(each, float) for each in value.values()):
+            words = (f"{key}={_short_text(each)}" for key, each in value.items())
+        return f"<{', '.join(words)}>"
     if isinstance(value, tuple | list):
-        return f"({', '.join(map(_shown, value)) if len(value) <= few else f'{len(value)} entries'})"
+        if len(value) <= few:
+            return f"({', '.join(map(_short_text, value))})"
+        return f"({len(value)} entries)"
     if is_dataclass(value) and not isinstance(value, type):
         named = [each.name for each in fields(value) if each.name == "name" and not _is_default(value, each)]
-        known = _found(value) or named
-        text = _shown(getattr(value, known[0])) if known else repr(value)
+        known = _finding_names(value) or named
+        text = _short_text(getattr(value, known[0])) if known else repr(value)
         return text if len(text) <= 80 else f"{type(value).__name__}(...)"
-    text = repr(value)
-    return text if len(text) <= longest else f"{text[: longest - 4]} ..."
+    return _cut(repr(value), longest)

@@ -14,11 +14,9 @@ from contextlib import contextmanager, suppress
 from threading import Lock, Thread
 from types import FrameType
 
-# what a long computation calls between its steps, with the number done, that of all, and what runs next
+# called by a long computation between its steps, with the number done, that of all, and the next step in words
 Progress = Callable[[int, int, str], object]
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-# seconds that the main thread has before the second thread ends the process
-PATIENCE = 0.5
 
 _undone: list[Callable[[], object]] = []
 _stopping = Lock()
@@ -51,7 +49,8 @@ def stop_on_signals() -> None:
 def _stop_late(reading: int) -> None:
     """Stop some time after a signal, where the main thread has not done so."""
     number = os.read(reading, 1)[0]
-    time.sleep(PATIENCE)
+    # seconds that the main thread has
+    time.sleep(0.5)
     _stop(number)
 
 

@@ -26,7 +26,7 @@ from tfarm.arm import (
 )
 from tfarm.arm.chain import CHAIN_TABLES, chain_of_tables
 from tfarm.arm.law_tables import LawTable, SignalTable, WeightTable
-from tfarm.arm.schema import ARM_TABLES, SHAPE_TABLES, ArmTable, LinkTable, arm_of_table, file_keys
+from tfarm.arm.schema import PART_TABLES, SHAPE_TABLES, ArmTable, LinkTable, arm_of_table, file_keys
 from tfarm.fitting.recording import RunTable
 
 RIG = """\
@@ -221,7 +221,7 @@ def test_an_arm_or_rig_written_and_read_is_the_same_to_the_last_bit(tmp_path_fac
 FILE_TABLES = {
     "top": [ArmTable], "link": [LinkTable], "link.section": SHAPE_TABLES.values(), "law": [LawTable],
     "law.SIGNAL": [SignalTable], "weights": [WeightTable], "measured": [RunTable],
-    **{name: [table] for name, table in (ARM_TABLES | CHAIN_TABLES).items() if name not in ("", "link")},
+    **{name: [table] for name, table in (PART_TABLES | CHAIN_TABLES).items() if name != "link"},
 }  # fmt: skip
 
 

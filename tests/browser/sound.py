@@ -28,7 +28,9 @@ from tfarm.fitting.fit import fit
 from tfarm.report import write, writing
 from tfarm.report.live import ASSETS, save_live, write_assets
 from tfarm.report.page import ArmReport, GivenLaw
-from tfarm.report.writing import PIECES, pieces_of, write_comparison, write_study
+from tfarm.report.sections import PIECES, make_section, pieces_of
+from tfarm.report.study_page import write_study
+from tfarm.report.writing import write_comparison
 
 LAB = replace(tfarm.load("sasaki2012-lab"), name=NAME, assumptions=ARM.assumptions)
 LAW = tfarm.Law({"hub_angle": ([2.0, 8.0], [0.02, 1.0]), "hub_rate": 0.4}, name=TEXT)
@@ -53,7 +55,7 @@ def few(tmp_path_factory):
     chain = load_chain("sasaki2012-lab")
     few = [piece for piece in PIECES if piece.anchor in ("arm", "modes", "margins", "law")]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tfarm.report.writing.PIECES", tuple(few))
+        patch.setattr("tfarm.report.sections.PIECES", tuple(few))
         patch.setattr(writing, "save_proof", lambda *_: None)
         write([LAB], out, only=("modes", "margins"))
         write([replace(LAB, name="law")], out, laws=[[GivenLaw(LAW)]], only=("margins", "law"))
@@ -61,7 +63,9 @@ def few(tmp_path_factory):
         H = tfarm.transfer(LAB, "root_moment")(1j * omega)
         seen = tfarm.Measured(output="root_moment", input="hub_torque", omega=omega, values=H, sigma=abs(H))
         found = fit(LAB, [seen], free=["hub.inertia"], profile=False)
-        patch.setattr("tfarm.report.writing.PIECES", tuple(piece for piece in PIECES if piece.anchor in ("fit", "arm")))
+        patch.setattr(
+            "tfarm.report.sections.PIECES", tuple(piece for piece in PIECES if piece.anchor in ("fit", "arm"))
+        )
         _arm_pages(ArmReport(replace(found.arm, name="fitted"), chain, (), found), out / "fitted")
     save_live(ArmReport(LAB, chain), out / NAME)
     write_assets(out / ASSETS)
@@ -74,7 +78,7 @@ def few(tmp_path_factory):
 def _arm_pages(subject: ArmReport, folder: Path) -> None:
     """The first page on a subject, and those of the sections that there are."""
     folder.mkdir()
-    sections = [writing.make_section(piece, subject, folder) for piece in pieces_of(subject)]
+    sections = [make_section(piece, subject, folder) for piece in pieces_of(subject)]
     writing.save_card(subject, folder)
     writing._write_pages(subject, folder, sections, None, "", folder)
 

@@ -16,7 +16,7 @@ from tests.shell import answer, run
 from tfarm import HubFeedback, Law
 from tfarm.arm.chain import Sampling, chain_of_tables
 from tfarm.case import Case
-from tfarm.cli.app import load_chain
+from tfarm.cli.options import chain_of_options
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
 from tfarm.loop.sampled_brief import brief_of
@@ -94,7 +94,7 @@ def test_gains_that_fail_when_sampled_are_not_recommended_without_a_word(capsys,
     [
         (Chain(), HubFeedback(K1=0.3), "tfarm's default period"),
         (Chain(), Law({"hub_rate": 0.3}, period=0.01), "the controller's period"),
-        (load_chain("sasaki2012-lab", period=0.01), HubFeedback(K1=0.3), "--period"),
+        (chain_of_options("sasaki2012-lab", period=0.01), HubFeedback(K1=0.3), "--period"),
         (chain_of_tables({"sampling": {"period": 0.01}}), HubFeedback(K1=0.3), "the file's period"),
         (Chain(sampling=Sampling(period=0.02)), HubFeedback(K1=0.3), ""),
     ],

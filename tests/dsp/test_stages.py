@@ -24,7 +24,6 @@ from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, Slew, kernel, scenario
 from tfarm.dsp.kernel import AMPLIFIER, DAC, ENCODER
 from tfarm.dsp.simulate import quantisers
-from tfarm.dsp.traces import RECORD_LENGTH
 from tfarm.exported import controller, fmu, live_loop, tuner_code
 from tfarm.exported.controller import c_controller
 from tfarm.exported.kernel import Status
@@ -75,7 +74,7 @@ def chain_of(stages):
 def vector(chain, count=MODES):
     """The simulation of a slew of a chain with noise on its references, none of its values next to a tie."""
     rng = np.random.default_rng(1)
-    task = scenario("slew", ARM, chain, RECORD_LENGTH * chain.slew.rise_time)
+    task = scenario("slew", ARM, chain, 3.0 * chain.slew.rise_time)
     sizes = {"feedforward": 3.0, "hub_angle": 0.1, "hub_rate": 1.0, "rigid_moment": 1.0}
     noise = {name: getattr(task, name) + size * rng.normal(size=task.t.size) for name, size in sizes.items()}
     truth = Simulator(Case(ARM, LAW, chain), replace(task, **noise), count=count).run()

@@ -21,7 +21,7 @@ from tests.tuner.bounded import some_trial
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.exported.tuner_code import ExportedTuner
 from tfarm.tuner import best_constant, find_guard
-from tfarm.tuner.trial import FORMAT, SavedTuner, to_text
+from tfarm.tuner.trial import SavedTuner, to_text
 
 LEVELS = ("-O0", "-O2")
 PRECISIONS = ("double", "float")
@@ -44,7 +44,7 @@ def some_tuner(rng, **changed):
     inputs, hidden = int(rng.choice([6, 7])), int(rng.integers(1, 13))
     size = float(rng.choice([0.5, 5.0, 50.0]))
     return SavedTuner(
-        format=FORMAT, arm="sasaki2012-lab", period=0.01, K1=0.3, Kp=float(rng.choice([0.0, 2.0])),
+        format="tfarm tuner 1", arm="sasaki2012-lab", period=0.01, K1=0.3, Kp=float(rng.choice([0.0, 2.0])),
         signals=str(rng.choice(["vibration", "total"])), a=1.0, b=2.6,
         guard_kind="time-varying", guard=SECTOR,
         scales=(10 ** rng.uniform(-2, 2, inputs)).tolist(),

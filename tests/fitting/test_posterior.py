@@ -26,7 +26,7 @@ from tfarm.plots.frequency import draw_band, draw_share
 from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import fit_section
 from tfarm.spectrum.gains import default_gains
-from tfarm.studies.study import load_study
+from tfarm.studies.declaration import load_study
 
 MASS, OFFSET, E, I = "payload.mass", "payload.offset", "link.youngs_modulus", "link.section.second_moment"
 COVARIANCE = [[0.04, -0.018], [-0.018, 0.01]]  # of ln mass, and of offset/0.05: correlation -0.9

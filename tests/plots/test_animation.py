@@ -9,9 +9,10 @@ from PIL import Image
 
 import tfarm
 from tfarm.dsp import Chain, Sampling, load_chain
-from tfarm.dsp.traces import MOST_FRAMES, Motion, exaggeration, motion_of
-from tfarm.plots.animation import DOTS, draw_motion, film
-from tfarm.plots.style import settled, style
+from tfarm.dsp.traces import Motion, exaggeration, motion_of
+from tfarm.plots.animation import draw_motion, film
+from tfarm.plots.files import fix_layout
+from tfarm.plots.style import style
 
 LAB = tfarm.load("sasaki2012-lab")
 GAINS = tfarm.default_gains(LAB)
@@ -75,7 +76,7 @@ def test_a_film_has_a_frame_for_each_twentieth_of_its_own_second_and_the_same_by
     shown = tfarm.plots.animate(LAB, run)
     gif = Image.open(io.BytesIO(shown.gif))
     lasts = float(run.t[-1]) / motion.speed
-    assert shown.frames == gif.n_frames == 1 + round(20 * lasts) <= MOST_FRAMES + 1
+    assert shown.frames == gif.n_frames == 1 + round(20 * lasts) <= 240 + 1
     assert gif.info["duration"] == 50
     assert 20 / motion.speed >= 8 * tfarm.modes(LAB, 1).natural_frequency_hz[-1]
     assert len(shown.gif) < 1_000_000
@@ -95,12 +96,12 @@ def test_a_film_has_a_frame_for_each_twentieth_of_its_own_second_and_the_same_by
 def test_a_frame_is_the_picture_drawn_anew(motion, share):
     """By a figure of its own, of which nothing was drawn before."""
     frame, drawn = round(share * (motion.t.size - 1)), io.BytesIO()
-    gif = Image.open(io.BytesIO(film(motion).gif))
+    gif = Image.open(io.BytesIO(film(motion, dpi=90).gif))
     gif.seek(frame)
     with style():
         figure = draw_motion.figure(motion._replace(still=frame))
-        settled(figure)
-        figure.savefig(drawn, format="png", dpi=DOTS)
+        fix_layout(figure)
+        figure.savefig(drawn, format="png", dpi=90)
     shown, whole = (np.asarray(each.convert("RGB")).astype(int) for each in (gif, Image.open(drawn)))
     assert shown.shape == whole.shape
     assert abs(shown - whole).max() < 100  # of 255: edges in 48 colours; a frame away it is 229

@@ -14,7 +14,7 @@ from tests.plots.labels import complaints
 from tests.rigs import rig, some_rig
 from tests.shell import refused, run
 from tfarm.arm import Gauge, RotarySpring
-from tfarm.plots import sketch, style
+from tfarm.plots import files, sketch, style
 
 mpl.use("Agg")
 
@@ -166,6 +166,6 @@ def test_check_draws_the_arm_and_prints_what_it_printed_without(kind, tmp_path, 
     # after lines of progress on a slow machine
     assert err.endswith(f"written: {file}\n")
     again = tmp_path / f"again.{kind}"
-    style.save_picture(sketch.figure, tfarm.load("quanser-2dsfl"), again)
+    files.save_picture(sketch.figure, tfarm.load("quanser-2dsfl"), again)
     assert file.read_bytes() == again.read_bytes()
     assert "give a name that ends in .png, .svg or .pdf" in refused(capsys, "check", "quanser-2dsfl", "--figure", "a.b")

@@ -17,7 +17,7 @@ from tfarm.case import Case
 from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.locus import locus
 from tfarm.loop.stability import stability
-from tfarm.plots import gain_map, overlay, style
+from tfarm.plots import gain_map, gain_regions, style
 from tfarm.plots import locus as locus_plot
 from tfarm.report.blocks import TEMPLATES
 from tfarm.spectrum.gains import default_gains
@@ -106,7 +106,7 @@ def test_a_map_has_the_colour_of_the_number_of_unstable_poles_of_the_loop():
 
 
 def test_a_sampled_region_is_hatched_with_a_dashed_edge_in_the_colour_of_what_is_stable():
-    ax = overlay.figure(tfarm.map(LAB, K1, K2), sampled_map(tfarm.sampled(LAB, LAW).verdict.loop, K1, K2)).axes[0]
+    ax = gain_regions.figure(tfarm.map(LAB, K1, K2), sampled_map(tfarm.sampled(LAB, LAW).verdict.loop, K1, K2)).axes[0]
     looks = dict(zip(*ax.get_legend_handles_labels()[::-1], strict=True))
     one, other = (next(each for label, each in looks.items() if word in label) for word in ("every mode", "sampled"))
     assert (to_hex(one.get_facecolor()[0]), one.get_hatch()) == (style.REGIONS[0], None)

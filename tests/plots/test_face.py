@@ -25,8 +25,8 @@ from tfarm.fitting.data import Measured
 from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.loci import reduced_locus
 from tfarm.loop.nyquist import compress_radius
+from tfarm.plots.labels import number_label
 from tfarm.plots.regions import colours, contours
-from tfarm.plots.style import number_label
 from tfarm.spectrum.gains import default_gains
 from tfarm.tuner import Plan
 
@@ -36,7 +36,7 @@ LAB = tfarm.load("sasaki2012-lab")
 MICRO = Path(__file__).parents[1] / "data" / "reproductions" / "micro2.toml"
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
 LEAD = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_deflection": ([0.5], [0.02, 1.0])})
-AXES = {"comparison": 3, "bode": 2, "loop": 2, "measured": 3, "modes": 3, "slew": 3, "step": 4, "study": 4}
+AXES = {"comparison": 3, "bode": 2, "loop": 2, "measured_response": 3, "modes": 3, "slew": 3, "step": 4, "study": 4}
 AXES |= {"study_scatter": 6}  # of a plot that has several
 PICTURES = sorted({*tfarm.plots.__all__} - {"animate", "column"})
 OTHERS = [f"{name} of a rig" for name in ("gain_map", "nyquist", "disc", "bode", "locus", "loop", "nichols")]
@@ -70,13 +70,13 @@ def records(tmp_path_factory):
         "bode": lambda: [tfarm.bode(LAB, "root_moment", (1.0, 300.0))],
         "gain_map": lambda: [plane()],
         "locus": lambda: [tfarm.locus(LAB, LAW, "K2", -1.0, 1.6, points=60, branches=3)],
-        "measured": lambda: [tfarm.overlay(LAB, sweep())],
+        "measured_response": lambda: [tfarm.overlay(LAB, sweep())],
         "modes": lambda: [tfarm.modes(LAB, count=3)],
         **dict.fromkeys(("nyquist", "disc"), lambda: [tfarm.nyquist(LAB, LAW)]),
         "loop": lambda: [tfarm.loop_function(LAB, LAW, Chain())],
         "nichols": lambda: [tfarm.margins(LAB, LAW)],
         "sensitivity": lambda: [tfarm.loop_function(LAB, LAW)],
-        "overlay": lambda: [plane(), sampled_map(tfarm.sampled(LAB, LAW, count=8).verdict.loop, K1, K2)],
+        "gain_regions": lambda: [plane(), sampled_map(tfarm.sampled(LAB, LAW, count=8).verdict.loop, K1, K2)],
         "sketch": lambda: [LAB],
         "tuned_gain": lambda: [tfarm.tune(LAB, Plan(trials=1))],
         "slew": lambda: [LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)],
@@ -275,8 +275,8 @@ def test_a_reduced_locus_is_drawn_with_the_exact_one(vary, stop):
 
 
 def test_measured_draws_both_curves_and_the_coherence(records):
-    (found,) = records("measured")
-    upper, middle, lower = tfarm.plots.measured(found, ax=axes_for(3))
+    (found,) = records("measured_response")
+    upper, middle, lower = tfarm.plots.measured_response(found, ax=axes_for(3))
     drawn = {line.get_label(): line.get_data() for line in upper.lines}
     data = found.measured
     assert drawn["measured"][0].tolist() == (data.omega / (2 * np.pi)).tolist()
@@ -303,8 +303,8 @@ def test_a_comparison_draws_both_responses_and_both_regions(records):
 
 
 def test_overlay_draws_both_regions_edges(records):
-    plane, sampled = records("overlay")
-    ax = tfarm.plots.overlay(plane, sampled, ax=axes_for(0))
+    plane, sampled = records("gain_regions")
+    ax = tfarm.plots.gain_regions(plane, sampled, ax=axes_for(0))
     drawn = {(float(x), float(y)) for line in ax.lines for x, y in zip(*line.get_data(), strict=True)}
     for region in (plane, sampled):
         columns = zip(region.K1.tolist(), region.stable_intervals, strict=True)

@@ -9,7 +9,7 @@ import pytest
 import tfarm
 from tests.plots.labels import complaints
 from tfarm.loop.locus import locus
-from tfarm.plots import style
+from tfarm.plots import files, style
 
 mpl.use("Agg")
 
@@ -48,7 +48,7 @@ def test_axes_side_by_side_are_below_each_other_on_a_phone():
     """Those of mode shapes; with as many axes, each as wide as the picture but for its labels."""
     with style.drawn_for("phone"):
         figure = PICTURES["modes"]()
-        style.settled(figure)
+        files.fix_layout(figure)
     boxes = [ax.get_position() for ax in figure.axes]
     assert len(boxes) == len(PICTURES["modes"]().axes) == 4
     assert all(upper.y0 > lower.y1 for upper, lower in itertools.pairwise(boxes))

@@ -10,13 +10,15 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 import tfarm
 from tests.plots.labels import linear_rgb
 from tests.shell import refused, run
-from tfarm.plots import column, frequency, style
-from tfarm.plots.regions import SLATE
+from tfarm.plots import column, files, frequency, style
+from tfarm.plots.files import save_figure
+from tfarm.plots.regions import contours
 from tfarm.plots.style import (
     BLUE,
     GOOD,
@@ -30,7 +32,6 @@ from tfarm.plots.style import (
     PURPLE,
     REGIONS,
     UNSTABLE,
-    save_figure,
 )
 from tfarm.report.blocks import TEMPLATES
 from tfarm.response.frequency import bode
@@ -115,7 +116,12 @@ def test_regions_are_in_order_and_their_counts_can_be_read_on_both_grounds(dark)
 
 def test_contours_of_damping_can_be_read_on_the_stable_region(dark):
     """Their lines as letters: they are a point thin."""
-    ground, line = rgb(REGIONS[0]), rgb(SLATE)
+    ax = Figure().subplots()
+    contours(np.arange(3.0), np.arange(3.0), np.array([[0.01, 0.02, 0.03]] * 3), ax)
+    ground = rgb(REGIONS[0])
+    (line,) = {mpl.colors.to_rgb(line.get_color()) for line in ax.lines}
+    assert ax.collections[0].get_edgecolor()[0, :3] == pytest.approx(line)
+    line = np.array(line)
     assert contrast(line, ground) >= TEXT
     assert contrast(dark(line), dark(ground)) >= TEXT
 
@@ -219,7 +225,7 @@ def test_a_layout_leaves_axes_where_matplotlib_does_and_writes_its_file(place, t
     """Against its own layout, by letters of a renderer of its own; with ticks found at every use the same bytes."""
     with style.drawn_for(place):
         here, there = (frequency.bode.figure(bode(LAB, "root_moment")) for _ in range(2))
-        style.settled(here)
+        files.fix_layout(here)
         FigureCanvasAgg(there)
         there.get_layout_engine().execute(there)
         for own, other in zip(here.axes, there.axes, strict=True):
@@ -228,6 +234,6 @@ def test_a_layout_leaves_axes_where_matplotlib_does_and_writes_its_file(place, t
             sizes = [ax.yaxis.label.get_window_extent().size for ax in (own, other)]
             assert sizes[0] == pytest.approx(sizes[1])
         save_figure(here, tmp_path / "kept.svg")
-        monkeypatch.setattr(style, "ticks_kept", lambda _: nullcontext())
+        monkeypatch.setattr(files, "ticks_kept", lambda _: nullcontext())
         save_figure(here, tmp_path / "anew.svg")
     assert (tmp_path / "kept.svg").read_bytes() == (tmp_path / "anew.svg").read_bytes()

@@ -30,7 +30,7 @@ from tfarm.arm import to_toml
 
 WRITE = (
     "import sys; from pathlib import Path; import tfarm; from tfarm.report import write; "
-    "from tfarm.report.writing import QUESTIONS; "
+    "from tfarm.report.sections import QUESTIONS; "
     "write([tfarm.load(sys.argv[1])], Path(sys.argv[2]), only=tuple(QUESTIONS), notice=print)"
 )
 BY_NYQUIST = "unstable poles by Nyquist's criterion"

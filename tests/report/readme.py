@@ -9,10 +9,10 @@ from tfarm.case import Case
 from tfarm.digits import plain
 from tfarm.dsp import load_chain
 from tfarm.plots.arm_sketch import sketch
+from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import bode as bode_plot
 from tfarm.plots.motion import modes
-from tfarm.plots.regions import overlay
-from tfarm.plots.style import save_figure
+from tfarm.plots.regions import gain_regions
 from tfarm.response.frequency import bode, resonant_band
 from tfarm.spectrum.gains import default_gains
 
@@ -27,7 +27,7 @@ def write_pictures(out: Path) -> None:
     both = {label: bode(arm, "root_moment", band) for label, arm in zip(labels, (undamped, lab), strict=True)}
     figures = {
         "bode-root-moment": bode_plot.figure(both),
-        "gains": overlay.figure(*stable_regions(Case(lab, default_gains(lab), load_chain(lab.name)))),
+        "gains": gain_regions.figure(*stable_regions(Case(lab, default_gains(lab), load_chain(lab.name)))),
         "mode-shapes": modes.figure(tfarm.modes(lab, count=4)),  # two rows
     }
     for stem, figure in figures.items():

@@ -28,7 +28,7 @@ from tfarm.report import writing
 from tfarm.report.loop_section import law_section, margins_section
 from tfarm.report.page import ArmReport, GivenLaw, file_of
 from tfarm.report.sampled_section import sampled_section, step_rows
-from tfarm.report.writing import pieces_of
+from tfarm.report.sections import pieces_of
 from tfarm.schema import to_json
 
 LAB, BARE, PRESET = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "quanser-2dsfl"))

@@ -17,16 +17,16 @@ from tests.hostile import NAME, TEXT, check_drawing, check_page
 from tests.report.written import ANCHORS, ARM, HELD, Links, Unmakeable, files_of, links_of, plain_cards
 from tests.shell import refused, run
 from tfarm.arm import to_toml
-from tfarm.cli import app as cli_app
+from tfarm.cli.progress import progress
 from tfarm.dsp import Chain, load_chain
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import fit
 from tfarm.report import page as report_page
-from tfarm.report import write, writing
+from tfarm.report import sections, write, writing
 from tfarm.report.blocks import render
 from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import fit_section
-from tfarm.report.writing import SectionSpec, make_section, pieces_of
+from tfarm.report.sections import SectionSpec, make_section, pieces_of
 
 OMEGA = np.geomspace(8.0, 300.0, 30)
 NOT_OF_IT = Measured(output="root_moment", input="hub_torque", omega=OMEGA, values=OMEGA + 0j)  # of a hub that turns
@@ -81,7 +81,7 @@ def test_an_index_without_the_picture_of_an_arm_names_it(tmp_path, monkeypatch):
 def with_a_bug(monkeypatch):
     """Put a section of a bug in the place of the page of the arm: what is written first is made before it."""
     broken = SectionSpec("the arm", "arm", Unmakeable(ValueError("a bug")), on="modes")
-    monkeypatch.setattr(writing, "PIECES", (broken,))
+    monkeypatch.setattr(sections, "PIECES", (broken,))
 
 
 def test_overview_and_live_page_are_written_first_and_stay(tmp_path, monkeypatch):
@@ -211,9 +211,8 @@ def test_the_folder_of_an_arm_is_small(pages):
     assert of_phones < 2e6
 
 
-def test_progress_is_a_line_in_a_pipe_too(monkeypatch, capsys):
-    monkeypatch.setattr(cli_app, "PROGRESS_AFTER", 0.02)
-    with cli_app.progress() as advance:
+def test_progress_is_a_line_in_a_pipe_too(capsys):
+    with progress(0.02) as advance:
         advance(3, 7, "a section")
         deadline = time.monotonic() + 30
         seen = ""

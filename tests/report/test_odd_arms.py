@@ -36,7 +36,7 @@ from tfarm.report.response_sections import (
     derived_table,
     modal_table,
 )
-from tfarm.report.writing import pieces_of
+from tfarm.report.sections import pieces_of
 from tfarm.spectrum import DampedModes
 from tfarm.spectrum.gains import default_gains
 

@@ -81,6 +81,6 @@ def test_no_line_of_energy_where_it_is_no_argument(name):
     K1, K2 = law.K1 * np.geomspace(0.5, 2.0, 3), np.linspace(-1.0, 2.0, 4)
     sampled = sampled_map(tfarm.sampled(arm, law).verdict.loop, K1, K2)
     ax = Figure().subplots()
-    plots.overlay(tfarm.map(arm, K1, K2), sampled, ax=ax)
+    plots.gain_regions(tfarm.map(arm, K1, K2), sampled, ax=ax)
     words = " ".join(ax.get_legend_handles_labels()[1])
     assert ("proven by energy" in words) == arm.is_uniform

@@ -21,9 +21,9 @@ from tfarm.dsp import Chain, Simulator, scenario
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.stability import stability
 from tfarm.loop.windows import windows_of
-from tfarm.plots.regions import overlay
+from tfarm.plots.regions import gain_regions
 from tfarm.report import sampled_section as page
-from tfarm.report.blocks import DRAWN_DIGITS, prose, save_block
+from tfarm.report.blocks import prose, save_block
 from tfarm.report.page import FILM_FRAMES, ArmReport, GivenLaw
 from tfarm.report.sampled_section import sampled_section, slews
 from tfarm.schema import text
@@ -33,6 +33,7 @@ LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 GAINS = HubFeedback(K1=0.3, K2=0.3)
 PLANE = cache(lambda: stable_regions(Case(LAB, GAINS)))
 analysed = cache(tfarm.sampled)
+DRAWN_DIGITS = 7  # of the numbers of a picture
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +52,7 @@ def test_the_picture_of_a_rig_is_as_high_as_its_own_gains():
     """Driven by its motor's current, K2 balances a torque at 0.112 A/(N m), and not at 1."""
     rig = tfarm.load("quanser-2dsfl")
     data = stable_regions(Case(rig, default_gains(rig)))
-    low, high = overlay.figure(*data).axes[0].get_ylim()
+    low, high = gain_regions.figure(*data).axes[0].get_ylim()
     assert 0.112 < high < 0.2
     *_, sampled = data.sampled
     ((bottom, top),) = sampled.stable_intervals[0]

@@ -40,8 +40,9 @@ from tfarm.report.blocks import TEMPLATES, explain_commands, prose, sheet, templ
 from tfarm.report.overview import Card, results, save_card
 from tfarm.report.page import ArmReport, GivenLaw, best
 from tfarm.report.response_sections import arm_section
+from tfarm.report.sections import PIECES, QUESTIONS, make_section, pieces_of
 from tfarm.report.trust import write_trust, written_proofs
-from tfarm.report.writing import PIECES, QUESTIONS, make_section, navigation, pieces_of, read_records, write_index
+from tfarm.report.writing import navigation, read_records, write_index
 from tfarm.schema import Column, quantities, to_dict
 from tfarm.spectrum.gains import default_gains
 

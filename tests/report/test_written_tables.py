@@ -12,10 +12,11 @@ import pytest
 import tfarm
 from tests.hostile import NAME
 from tests.report.written import ARM
-from tfarm.report.blocks import DRAWN_DIGITS
 from tfarm.report.response_sections import sensitivity_table
 from tfarm.schema import curve_table
 from tfarm.spectrum.gains import default_gains
+
+DRAWN_DIGITS = 7  # of the numbers of a picture
 
 
 def rows_of(pages, stem):

@@ -25,7 +25,7 @@ from tfarm.loop import loci
 from tfarm.loop import sampled_modes as sampled_loci
 from tfarm.report import overview, page, writing
 from tfarm.report.page import ArmReport
-from tfarm.report.writing import PIECES
+from tfarm.report.sections import PIECES
 
 COARSE = (
     (stability_map, "GRID_COLUMNS", 48),

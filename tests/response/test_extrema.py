@@ -21,7 +21,8 @@ from tfarm.errors import TfarmError
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.report.blocks import prose
 from tfarm.report.response_sections import bode_facts
-from tfarm.response.frequency import extrema, resonant_band
+from tfarm.response.extrema import extrema
+from tfarm.response.frequency import resonant_band
 
 FLEX, BARE = tfarm.load("quanser-flexlink"), tfarm.load("sasaki2012")
 NONE = np.empty(0)

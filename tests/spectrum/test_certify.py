@@ -22,7 +22,6 @@ from tfarm.arm import THEORIES
 from tfarm.exact import appendix, balls
 from tfarm.exact.balls import point, precision
 from tfarm.exact.system import system_of
-from tfarm.spectrum import frequencies, proofs
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.frequencies import RealAxis, count_below, natural_frequencies, pinned_count
 from tfarm.spectrum.proofs import Disc, _holds_one, certify, disjoint, enclose_zero, proven_count
@@ -159,13 +158,12 @@ def test_discs_of_real_zeros_are_real() -> None:
                 assert abs(mpmath.mpf(disc.re) - root) < mpmath.mpf(disc.radius)
 
 
-def test_a_double_eigenvalue_has_no_disc(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_double_eigenvalue_has_no_disc() -> None:
     """Without shear and at C w = 2 exactly both zeros are -w; the double nearest to that C leaves them 1e-8 apart."""
     rigid = damped_arm(0.0, hub=math.inf)
     omega = tfarm.modes(rigid, 2, theory="euler-bernoulli").natural_frequency
     arm = replace(rigid, link=replace(rigid.link, damping=2 / float(omega[1])))
     k = system_of(arm, "euler-bernoulli")
-    monkeypatch.setattr(frequencies, "MOST_AXIS_BITS", 1000)
     assert "double" in str(refusal(enclose_zero, k, complex(-omega[1]) * (1 + 1e-4), 5, kind=CertificationError))
 
 
@@ -272,11 +270,10 @@ def test_an_inexact_eigenvalue_is_refused(turn: complex) -> None:
         replace(damped, eigenvalues=zeros).certify()
 
 
-def test_a_contour_that_takes_too_many_pieces_is_given_up(monkeypatch):
+def test_a_contour_that_takes_too_many_pieces_is_given_up():
     """One arm's proof took 27,000 evaluations for a third of one side; a proof ends, or reports that it does not."""
     k = system_of(tfarm.load("sasaki2012-lab"))
     box = Box(-300.0, 100.0, -400.0, 400.0)
     assert proven_count(k, box) > 0
-    monkeypatch.setattr(proofs, "MOST_PIECES", 20)
     with pytest.raises(CertificationError, match="needs more than 20 pieces: certify a shorter list"):
-        proven_count(k, box)
+        proven_count(k, box, most_pieces=20)

@@ -20,20 +20,11 @@ from tfarm.spectrum.gains import default_gains
 from tfarm.studies import quantities as room
 from tfarm.studies import running
 from tfarm.studies.candidates import learning_curves
-from tfarm.studies.quantities import (
-    COLUMNS,
-    column_names,
-    failures_of,
-    least_share,
-    order_of,
-    shares_of,
-    sources_of,
-    spreads_of,
-    values_of,
-)
+from tfarm.studies.findings import failures_of, least_share, shares_of, spreads_of
+from tfarm.studies.quantities import COLUMNS, column_names, order_of, sources_of, values_of
 from tfarm.studies.running import StudyPlan, chunk
 from tfarm.studies.space import Subject, Subjects, space_of
-from tfarm.studies.study import badness
+from tfarm.studies.worst import badness
 from tfarm.tuner import tune
 from tfarm.tuner.tuning import usual_plan
 

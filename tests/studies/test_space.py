@@ -19,8 +19,8 @@ from tfarm.arm.writing import numbers_of
 from tfarm.case import Case
 from tfarm.errors import ParameterError
 from tfarm.fitting.posterior import Posterior, PosteriorNumber
+from tfarm.studies.declaration import files_of
 from tfarm.studies.space import ENDS, Listing, Subjects, lines_of, listing_of, space_of
-from tfarm.studies.study import files_of
 
 CHANCE = 1e-3  # of a right distribution to be called wrong
 TRUE = {  # by kind: its numbers, and the distribution by another formula than the code's

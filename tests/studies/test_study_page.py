@@ -20,12 +20,13 @@ from tests.studies.pictured import DRAWS, LAB, planted_study
 from tfarm.plots.motion import OF_STABILITY
 from tfarm.plots.studies import distributions, study, study_band, study_scatter
 from tfarm.plots.style import GREY, column
-from tfarm.report import writing
-from tfarm.report.writing import write_study
+from tfarm.report import study_page
+from tfarm.report.study_page import write_study
 from tfarm.response.transfer import transfer
 from tfarm.schema import json_value, text, to_dict
 from tfarm.schema.terminal import show
-from tfarm.studies.study import SobolIndex, WorstArm
+from tfarm.studies.sobol import SobolIndex
+from tfarm.studies.worst import WorstArm
 
 COMMAND = ("study", "sasaki2012-lab", "--over", "payload.mass=uniform:0,0.2", "--over", "hub.inertia=uniform:0.05,0.2")
 WORST = WorstArm(
@@ -116,11 +117,12 @@ def test_a_section_has_the_reason_of_a_missing_response(found, monkeypatch):
     def refused(*_):
         raise tfarm.ParameterError(key="response", value=TEXT, remedy="no arm of the study has it")
 
-    monkeypatch.setattr(writing.studies.study_band, "figure", refused)
-    (section,) = (each for each in writing.study_sections(found) if each.title == "Responses")
+    monkeypatch.setattr(study_page.studies.study_band, "figure", refused)
+    (section,) = (each for each in study_page.study_sections(found) if each.title == "Responses")
     assert list(section.blocks) == []
     assert section.words[0].startswith("root_moment: response = ")
-    page = writing.render("study.html", title="x", sections=[section], explained=writing.explain_commands, found=found)
+    explained = study_page.explain_commands
+    page = study_page.render("study.html", title="x", sections=[section], explained=explained, found=found)
     check_page(page, "no arm of the study has it")
 
 
@@ -217,9 +219,8 @@ def test_each_arm_is_one_mark_in_the_colour_of_its_loop(found):
         assert sum(len(line.get_xdata()) for line in edge) == (~np.isfinite(y)).sum()
 
 
-def test_of_many_arms_some_are_drawn(found, monkeypatch):
-    monkeypatch.setattr("tfarm.plots.studies.MOST_MARKS", 10)
-    ax = study_scatter.figure(found, "least_damping").axes[0]
+def test_of_many_arms_some_are_drawn(found):
+    ax = study_scatter.figure(found, "least_damping", most=10).axes[0]
     assert sum(len(line.get_xdata()) for line in ax.lines) == 10
 
 
@@ -240,7 +241,7 @@ def test_a_band_has_the_curves_of_the_arms(found):
 
 
 def test_an_arm_without_a_response_is_left_out_and_none_at_all_is_an_error(found):
-    refused, place = tfarm.ConvergenceError("no", None, None), "tfarm.studies.quantities.transfer"
+    refused, place = tfarm.ConvergenceError("no", None, None), "tfarm.studies.findings.transfer"
     ready = transfer(found.parts.plan.case.arm, "root_moment")
     with mock.patch(place, side_effect=[ready, *[refused] * (DRAWS - 1), lambda s: 0 * s + 10]):
         (line, *_) = study_band.figure(found).axes[0].lines

@@ -173,9 +173,9 @@ def test_modes_are_quiet_where_they_lose_more_than_the_feedback_could_give(lab):
 @pytest.mark.parametrize("before", [(0.1, 0.6 - 6e-4), (0.1, 0.6 + 6e-4), (0.1 - 6e-4, 0.6), (0.1 + 6e-4, 0.6)])
 def test_a_guard_that_more_modes_change_by_a_thousandth_of_its_width_is_not_settled(lab, before):
     loops = [sampled_loop(Case(lab, HubFeedback(K1=0.3, K2=1.0)), count=count) for count in (2, 24)]
-    assert not guard._settled(loops, [before, (0.1, 0.6)])
+    assert not guard._is_settled(loops, [before, (0.1, 0.6)])
     nearer = tuple(end + 0.5 * (was - end) for was, end in zip(before, (0.1, 0.6), strict=True))
-    assert guard._settled(loops, [nearer, (0.1, 0.6)])
+    assert guard._is_settled(loops, [nearer, (0.1, 0.6)])
 
 
 def test_the_frozen_guard_is_stable_inside_and_not_beyond(lab):
@@ -208,8 +208,8 @@ def test_a_frozen_guard_is_the_window_nearest_to_a_best_gain_that_lies_in_none(l
     """By their middles: 0.5 is nearer to 2 than 5 is, and farther from 3.5."""
     monkeypatch.setattr(guard, "constant_windows", lambda loop: [(0.0, 1.0), (4.0, 6.0)])
     loops = [sampled_loop(Case(lab, HubFeedback(K1=0.3, K2=1.0)), count=2)]
-    assert guard._frozen(loops, 2.0).hi == pytest.approx(RADIUS_SHARE)
-    assert guard._frozen(loops, 3.5).lo == pytest.approx(4.0 + 2 * (1 - RADIUS_SHARE))
+    assert guard._find_interval(loops, 2.0).hi == pytest.approx(RADIUS_SHARE)
+    assert guard._find_interval(loops, 3.5).lo == pytest.approx(4.0 + 2 * (1 - RADIUS_SHARE))
 
 
 @pytest.mark.parametrize("best", [0.1, 0.336, 1.1])

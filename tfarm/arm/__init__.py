@@ -1,4 +1,19 @@
-"""The arm and its controller as frozen records, their TOML tables and the presets."""
+"""The arm and its controller as frozen records, their TOML tables and the presets.
+
+records     Arm: hub, link, payload and the other parts of a rig
+parts       the parts as records: sections, links, hub, springs, motor, attachments, payload
+checks      checks of single numbers and texts, inputs and beam theories
+materials   materials of links
+feedback    HubFeedback: the paper's law, and the table of its gains
+law         Law: a linear law from named signals to the input
+blocks      the blocks of a law: ratios of polynomials and state spaces
+chain       Chain: sampling, converters, actuator and slew
+stages      what happens in one sample, stage by stage
+schema      the tables of an arm's file and their keys
+law_tables  the table [law] of a file
+reading     arms of presets and files, and warnings of implausible values
+writing     arms and laws as TOML, arms by their keys
+"""
 
 from tfarm.arm.checks import INPUT_UNITS, INPUTS, THEORIES, WITH_ROTARY_INERTIA, WITH_SHEAR, Input, Theory
 from tfarm.arm.feedback import (

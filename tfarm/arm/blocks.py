@@ -127,12 +127,12 @@ class StateSpace:
                 raise ParameterError(key=name, value="matrix", remedy="rows of numbers") from None
             require(found.ndim == 2 and np.isfinite(found).all(), name, "matrix", "rows of finite numbers")
             object.__setattr__(self, name, found)
-        m = self.D.shape[1]
+        m = self.signals
         # without states
         if not self.A.size:
             object.__setattr__(self, "A", np.empty((0, 0)))
             object.__setattr__(self, "B", np.empty((0, m)))
-        n = len(self.A)
+        n = self.order
         for name, shape in {"A": (n, n), "B": (n, m), "C": (1, n), "D": (1, m)}.items():
             own = getattr(self, name).shape
             remedy = f"{own}, expected {shape}: A (n, n), B (n, m), C (1, n), D (1, m)"
@@ -214,7 +214,7 @@ def block_of(key: str, entry: Any) -> tuple[LawBlock, float | None]:
     dt = getattr(entry, "dt", None)
     period = None if dt is None or dt is True or dt == 0 else float(dt)
     if all(hasattr(entry, name) for name in "ABCD"):
-        system = StateSpace(*(getattr(entry, name) for name in "ABCD"))
+        system = StateSpace(entry.A, entry.B, entry.C, entry.D)
         # python-control's, with states of any size
         if hasattr(entry, "poles"):
             system = StateSpace(*balance_states(*system.matrices()))
@@ -259,9 +259,8 @@ def _polynomial(name: str, values: Any) -> tuple[float, ...]:
     found = [number(name, each, remedy) for each in values]
     # the square of one is still a double
     most = 1e150
-    require(
-        all(abs(each) <= most for each in found), name, found, f"finite numbers, at most {most:g} in size"
-    )
+    is_bounded = max(map(abs, found)) <= most
+    require(is_bounded, name, found, f"finite numbers, at most {most:g} in size")
     while len(found) > 1 and found[0] == 0:
         found.pop(0)
     require(len(found) <= MOST_DEGREE + 1, name, len(found) - 1, f"a degree of at most {MOST_DEGREE}")
@@ -271,9 +270,9 @@ def _polynomial(name: str, values: Any) -> tuple[float, ...]:
 def _of_roots(name: str, roots: ArrayLike) -> Real:
     """Return the monic real polynomial with these roots, (re, im) pairs or complex numbers, with their conjugates."""
     try:
-        each_root: list[Any] = list(roots)  # type: ignore[arg-type]
+        every: list[Any] = list(roots)  # type: ignore[arg-type]
         found = np.array(
-            [complex(*each) if isinstance(each, tuple | list) else complex(each) for each in each_root]
+            [complex(*each) if isinstance(each, tuple | list) else complex(each) for each in every]
         )
     except (TypeError, ValueError):
         remedy = "numbers, complex ones as [re, im], with their conjugates"

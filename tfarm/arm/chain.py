@@ -3,7 +3,6 @@
 By default everything is ideal.  Frozen records, checked once, SI units.
 """
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -23,22 +22,23 @@ from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.records import Arm
 from tfarm.arm.schema import ArmTable, TomlTable, validate_table
 from tfarm.arm.stages import are_linear
-from tfarm.arm.writing import to_toml
+from tfarm.arm.writing import to_toml, toml_tables, toml_text
 from tfarm.errors import ParameterError, must_be_known, name_file, require, unknown_key
 from tfarm.schema import Quantity
 
 MomentReading = Literal["vibration", "total"]
-# of a converter: of one bit there are no steps, of more than 32 no part
 # samples: each whole one is a state more
 MOST_DELAY = 100.0
-DELAYS = "a computational delay is zero or positive, in samples, at most 100"
 # of a time: by so little before a sample it is at it, as its quotient with the period is rounded
 TIME_ROUNDING = 1e-12
 PERIOD = Quantity("sampling period", "s", help="time between two samples of the controller")
-DELAY = Quantity(
-    "delay in samples", help="time from a sample to the torque computed from it, over the sampling period"
-)
-OF_AN_ARM = (*ArmTable.model_fields, "law")
+
+
+def _delay(key: str, value: object, meaning: str) -> float:
+    """Return a number of samples from 0 to `MOST_DELAY`."""
+    x = not_negative(key, value, meaning)
+    require(x <= MOST_DELAY, key, x, meaning)
+    return x
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,14 +52,21 @@ class Sampling:
     period: Annotated[
         float, PERIOD, positive, "a sampling period is a positive, finite time in seconds, 0.01 for instance"
     ] = 0.01
-    delay_samples: Annotated[float, DELAY, not_negative, DELAYS] = 0.0
+    delay_samples: Annotated[
+        float,
+        Quantity(
+            "delay in samples",
+            help="time from a sample to the torque computed from it, over the sampling period",
+        ),
+        _delay,
+        "a computational delay is zero or positive, in samples, at most 100",
+    ] = 0.0
     antialias_corner: Annotated[float, above_zero, "a corner is positive in rad/s, or inf for no filter"] = (
         math.inf
     )
 
     def __post_init__(self) -> None:
         check_annotated(self, "sampling")
-        require(self.delay_samples <= MOST_DELAY, "sampling.delay_samples", self.delay_samples, DELAYS)
 
     @property
     def whole_delay(self) -> int:
@@ -119,12 +126,12 @@ class Converters:
         must_be_known("converters.arithmetic", self.arithmetic, ("float64", "float32"))
         check_annotated(self, "converters")
         for signal in ("moment", "torque"):
+            key = f"converters.{signal}_bits"
             bits = getattr(self, f"{signal}_bits")
-            _whole(f"converters.{signal}_bits", bits, least_bits, most_bits, "bits")
-            remedy = f"{bits} bits need a range +-R: give it, or leave converters.{signal}_bits out"
-            require(
-                bits is None or getattr(self, f"{signal}_range"), f"converters.{signal}_range", None, remedy
-            )
+            _whole(key, bits, least_bits, most_bits, "bits")
+            is_bounded = bits is None or getattr(self, f"{signal}_range")
+            remedy = f"{bits} bits need a range +-R: give it, or leave {key} out"
+            require(is_bounded, f"converters.{signal}_range", None, remedy)
 
     @property
     def is_single(self) -> bool:
@@ -177,13 +184,13 @@ class Slew:
         must_be_known("slew.reading", self.reading, ("vibration", "total"))
 
     def travel_of(self, reach: float) -> float:
-        """Tip travel [m] of an arm whose tip is so far [m] from the axis."""
+        """Return the tip travel [m] of an arm whose tip is so far [m] from the axis."""
         # rad, as tip travel over length: the paper moves the tip of its 1 m by 1.15 m
         paper_angle = 1.15
         return paper_angle * reach if self.travel is None else self.travel
 
     def acceleration(self, reach: float) -> float:
-        """The hub's angular acceleration [rad/s^2] in the first half, 4 travel/(reach rise^2)."""
+        """Return the hub's angular acceleration [rad/s^2] in the first half, 4 travel/(reach rise^2)."""
         return 4 * self.travel_of(reach) / (reach * self.rise_time**2)
 
 
@@ -239,22 +246,26 @@ def load_chain(name_or_path: AnyFile) -> Chain:
 
 
 def chain_of_tables(tables: Mapping[str, Any]) -> Chain:
-    """The chain of a parsed file, which may also have the tables of an arm."""
-    for key in tables:
-        known = key in CHAIN_TABLES or key in OF_AN_ARM
-        require(known, key, tables[key], unknown_key(key, CHAIN_TABLES))
-    given = [name for name in CHAIN_TABLES if name in tables]
-    records = {name: validate_table(CHAIN_TABLES[name], tables[name], name).build() for name in given}
-    return Chain(**records, period_from="the file's period" if "period" in tables.get("sampling", {}) else "")
+    """Return the chain of a parsed file, which may also have the tables of an arm."""
+    known = {*CHAIN_TABLES, *ArmTable.model_fields, "law"}
+    for key, value in tables.items():
+        require(key in known, key, value, unknown_key(key, CHAIN_TABLES))
+    records = {}
+    for name, model in CHAIN_TABLES.items():
+        if name in tables:
+            records[name] = validate_table(model, tables[name], name).build()
+    has_period = "period" in tables.get("sampling", {})
+    return Chain(**records, period_from="the file's period" if has_period else "")
 
 
 def stated_keys(chain: Chain) -> dict[str, dict[str, Any]]:
     """Return the keys of each table of a chain that are no default."""
-    records = {table: getattr(chain, table) for table in CHAIN_TABLES}
-    return {
-        table: {f.name: value for f in fields(of) if (value := getattr(of, f.name)) != f.default}
-        for table, of in records.items()
-    }
+    found: dict[str, dict[str, Any]] = {}
+    for table in CHAIN_TABLES:
+        record = getattr(chain, table)
+        values = ((each, getattr(record, each.name)) for each in fields(record))
+        found[table] = {each.name: value for each, value in values if value != each.default}
+    return found
 
 
 def file_text(arm: Arm, chain: Chain | None = None) -> str:
@@ -264,8 +275,7 @@ def file_text(arm: Arm, chain: Chain | None = None) -> str:
     """
     text = to_toml(arm)
     for table, given in stated_keys(chain or Chain()).items():
-        lines = [
-            f"{key} = {json.dumps(of) if isinstance(of, str) else repr(of)}\n" for key, of in given.items()
-        ]
-        text += "".join([f"\n[{table}]\n", *lines]) if lines else ""
+        if given:
+            (lines,) = toml_tables(given, table)
+            text += f"\n{toml_text([lines])}"
     return text

@@ -15,13 +15,8 @@ import numpy as np
 from tfarm.arrays import Real as Reals
 from tfarm.errors import ParameterError, require
 
-# far outside any arm, yet no product of a few such numbers underflows
-SMALLEST_NUMBER = 1e-40
-# nor overflows
+# far outside any arm, yet no product of a few such numbers overflows, nor underflows one over it
 LARGEST_NUMBER = 1e40
-OUT_OF_RANGE = (
-    f"beyond any arm ({SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}); check the unit: m, kg, s, Pa throughout"
-)
 Input = Literal["hub_torque", "motor_voltage", "motor_current", "hub_angle"]
 INPUTS: tuple[Input, ...] = get_args(Input)
 INPUT_UNITS = {"hub_torque": "N m", "motor_voltage": "V", "motor_current": "A", "hub_angle": "rad"}
@@ -43,9 +38,22 @@ def number(key: str, value: object, meaning: str) -> float:
     try:
         x = float(cast("float", value))
     except OverflowError:
-        raise ParameterError(key=key, value=value, remedy=OUT_OF_RANGE) from None
+        raise _out_of_range(key, value) from None
     require(not math.isnan(x), key, value, f"{meaning}; nan is none")
     return x
+
+
+def _out_of_range(key: str, value: object) -> ParameterError:
+    """Return the error of a number of a size that no arm has."""
+    limits = f"{1 / LARGEST_NUMBER:g} to {LARGEST_NUMBER:g}"
+    remedy = f"beyond any arm ({limits}); check the unit: m, kg, s, Pa throughout"
+    return ParameterError(key=key, value=value, remedy=remedy)
+
+
+def _check_size(key: str, x: float) -> None:
+    """Raise ParameterError for a number of a size that no arm has."""
+    if not 1 / LARGEST_NUMBER <= abs(x) <= LARGEST_NUMBER:
+        raise _out_of_range(key, x)
 
 
 def whole(key: str, value: object, least: int, most: float, remedy: str) -> int:
@@ -61,8 +69,8 @@ def whole(key: str, value: object, least: int, most: float, remedy: str) -> int:
 def positive(key: str, value: object, meaning: str) -> float:
     """Return a finite number above zero, from 1e-40 to 1e40."""
     x = number(key, value, meaning)
-    require(x > 0.0 and not math.isinf(x), key, x, meaning)
-    require(SMALLEST_NUMBER <= x <= LARGEST_NUMBER, key, x, OUT_OF_RANGE)
+    require(0.0 < x < math.inf, key, x, meaning)
+    _check_size(key, x)
     return x
 
 
@@ -72,16 +80,18 @@ def not_negative(key: str, value: object, meaning: str) -> float:
     return 0.0 if x == 0.0 else positive(key, x, meaning)
 
 
-def signed(key: str, value: object, meaning: str) -> float:
+def finite(key: str, value: object, meaning: str) -> float:
     """Return zero or a finite number of either sign."""
     x = number(key, value, meaning)
     require(not math.isinf(x), key, x, meaning)
-    require(x == 0.0 or SMALLEST_NUMBER <= abs(x) <= LARGEST_NUMBER, key, x, OUT_OF_RANGE)
-    # -0.0 becomes 0.0
-    return x + 0.0
+    # also of -0.0
+    if x == 0.0:
+        return 0.0
+    _check_size(key, x)
+    return x
 
 
-def extended(key: str, value: object, meaning: str) -> float:
+def not_negative_or_inf(key: str, value: object, meaning: str) -> float:
     """Return zero, a positive number or inf."""
     x = number(key, value, meaning)
     return x if x == math.inf else not_negative(key, x, meaning)
@@ -89,7 +99,7 @@ def extended(key: str, value: object, meaning: str) -> float:
 
 def above_zero(key: str, value: object, meaning: str) -> float:
     """Return a positive number or inf."""
-    x = extended(key, value, meaning)
+    x = not_negative_or_inf(key, value, meaning)
     require(x, key, x, meaning)
     return x
 
@@ -102,17 +112,13 @@ def positive_if_given(key: str, value: object, meaning: str) -> float | None:
 def on_the_arm(key: str, x: Reals | float, length: float) -> Reals:
     """Return points x [m] of an arm of this length as an array.  Raises ParameterError for points off it and nan."""
     points = np.asarray(x, dtype=float)
-    require(
-        np.all((points >= 0) & (points <= length)),
-        key,
-        x,
-        f"a point of the arm lies between 0 and {length:g} m",
-    )
+    is_on_it = (points >= 0) & (points <= length)
+    require(is_on_it.all(), key, x, f"a point of the arm lies between 0 and {length:g} m")
     return points
 
 
 @cache
-def _annotated(kind: type) -> dict[str, tuple[Check, str]]:
+def _field_checks(kind: type) -> dict[str, tuple[Check, str]]:
     """Return check and meaning of each field of a class of records that ends its annotation with both."""
     hints = get_type_hints(kind, include_extras=True)
     marks: dict[str, Any] = {name: getattr(hint, "__metadata__", ()) for name, hint in hints.items()}
@@ -121,7 +127,7 @@ def _annotated(kind: type) -> dict[str, tuple[Check, str]]:
 
 def check_annotated(record: object, kind: str) -> None:
     """Replace each field of a frozen record that has a check in its annotation by its checked value."""
-    for name, (check, meaning) in _annotated(cast("Any", type(record))).items():
+    for name, (check, meaning) in _field_checks(cast("Any", type(record))).items():
         key = f"{kind}.{name}" if kind else name
         object.__setattr__(record, name, check(key, getattr(record, name), meaning))
 

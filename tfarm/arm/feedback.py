@@ -68,8 +68,8 @@ class HubFeedback:
     Kp: float = 0.0
 
     def __post_init__(self) -> None:
+        remedy = f"a gain is a finite number, at most {LARGEST_NUMBER:g} in size"
         for field in fields(self):
-            remedy = f"a gain is a finite number, at most {LARGEST_NUMBER:g} in size"
             value = number(field.name, getattr(self, field.name), remedy)
             require(abs(value) <= LARGEST_NUMBER, field.name, value, remedy)
             object.__setattr__(self, field.name, value)

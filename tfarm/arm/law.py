@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property, reduce
+from itertools import chain
 from operator import mul
 from typing import Annotated, Any
 
@@ -72,25 +73,20 @@ class Law:
         object.__setattr__(self, "parts", parts)
         object.__setattr__(self, "entries", {})
         check_annotated(self, "")
-        known = {float(each) for each in periods}
+        known = set(periods)
         if self.period is not None:
-            known.add(
-                positive(
-                    "period", self.period, "a sampling period in s; leave it out for a continuous-time law"
-                )
-            )
-        require(
-            len(known) <= 1, "period", sorted(known), "the parts of a law have one sampling period in common"
-        )
+            meaning = "a sampling period in s; leave it out for a continuous-time law"
+            known.add(positive("period", self.period, meaning))
+        remedy = "the parts of a law have one sampling period in common"
+        require(len(known) <= 1, "period", sorted(known), remedy)
         object.__setattr__(self, "period", known.pop() if known else None)
         object.__setattr__(self, "references", tuple(self.references))
         require(self.sign in (-1, 1), "sign", self.sign, "-1 (v = -C y, the default) or 1 (v = C y)")
         if self.input is not None:
             must_be_known("input", self.input, INPUTS)
         must_be_known("rule", self.rule, ("tustin", "zoh", "matched"))
-        require(
-            len(self.signals) <= most_signals, "signals", len(self.signals), f"at most {most_signals} signals"
-        )
+        count = len(self.signals)
+        require(count <= most_signals, "signals", count, f"at most {most_signals} signals")
         for each in self.references:
             must_be_known("references", each, self.signals)
         remedy = "a discrete-time law is causal: give num at most the degree of den"
@@ -124,16 +120,20 @@ class Law:
                 is_gain = block.is_constant and block.den == (1.0,)
                 yield part.signals[0], num[1:-1] if is_gain else f"({num}, {den})"
 
+    @property
+    def columns(self) -> list[str]:
+        """The names of all columns of its parts, in their order."""
+        return list(chain.from_iterable(part.signals for part in self.parts))
+
     @cached_property
     def signals(self) -> tuple[str, ...]:
         """The signals in the loop, each once."""
-        return tuple(dict.fromkeys(name for part in self.parts for name in part.signals if is_measured(name)))
+        return tuple(dict.fromkeys(filter(is_measured, self.columns)))
 
     @property
     def wanted(self) -> tuple[str, ...]:
         """The columns of references, such as "reference:hub_angle", each once."""
-        every = (name for part in self.parts for name in part.signals)
-        return tuple(dict.fromkeys(name for name in every if name.startswith(REFERENCE)))
+        return tuple(dict.fromkeys(name for name in self.columns if name.startswith(REFERENCE)))
 
     @property
     def is_discrete(self) -> bool:
@@ -165,10 +165,9 @@ class Law:
         """The law as gains at the hub; None where it has more than those."""
         if not self.is_static or not set(self.signals) <= set(ON):
             return None
-        numbers = self.values(np.zeros(1, complex))[:, 0].real
-        return HubFeedback(
-            **{ON[name]: float(each) for name, each in zip(self.signals, numbers, strict=True)}
-        )
+        numbers = self.values(np.zeros(1, complex))[:, 0].real.tolist()
+        names = (ON[name] for name in self.signals)
+        return HubFeedback(**dict(zip(names, numbers, strict=True)))
 
     @property
     def numbers(self) -> dict[str, float]:
@@ -199,7 +198,7 @@ class Law:
         A constant gain has the name of its signal, "hub_angle"; other blocks have a factor of 1, "hub_angle.gain".
         """
         found = {}
-        every = [name for part in self.parts for name in part.signals]
+        every = self.columns
         for place, part in enumerate(self.parts):
             name = part.signals[0]
             block = part.block
@@ -261,11 +260,9 @@ class Law:
         """
         from scipy.linalg import block_diag
 
-        names = [name for part in self.parts for name in part.signals]
-        chosen = np.array([[name == each for each in columns or self.signals] for name in names], float)
-        A, B, C, D = (
-            block_diag(*each) for each in zip(*(part.block.matrices() for part in self.parts), strict=True)
-        )
+        chosen = (np.array(self.columns)[:, None] == np.array(columns or self.signals)).astype(float)
+        blocks = [part.block.matrices() for part in self.parts]
+        A, B, C, D = (block_diag(*each) for each in zip(*blocks, strict=True))
         C, D = (-self.sign * each.sum(axis=0, keepdims=True) for each in (C, D))
         return A, B @ chosen, C, D @ chosen
 
@@ -278,9 +275,8 @@ class Law:
     def weighted(self, factors: Sequence[float]) -> Law:
         """Return the law with each part times its own factor."""
         pairs = zip(self.parts, factors, strict=True)
-        return replace(
-            self, parts=tuple(Part(part.signals, part.block.times(factor)) for part, factor in pairs)
-        )
+        parts = (replace(part, block=part.block.times(factor)) for part, factor in pairs)
+        return replace(self, parts=tuple(parts))
 
     def having(self, key: str, value: float) -> Law:
         """Return the law with another value of one number.
@@ -298,20 +294,17 @@ class Law:
         signal, of, place = NUMBER.fullmatch(key).groups("")  # type: ignore[union-attr]
         for n, part in enumerate(self.parts):
             if part.signals == (signal,):
-                changed = Part(part.signals, _varied(part.block, of, place, value, key))
-                return replace(self, parts=(*self.parts[:n], changed, *self.parts[n + 1 :]))
+                parts = list(self.parts)
+                parts[n] = Part(part.signals, _with_number(part.block, of, place, value, key))
+                return replace(self, parts=tuple(parts))
         known = ["gain", "delay", *(part.signals[0] for part in self.parts if len(part.signals) == 1)]
         raise ParameterError(key="law", value=key, remedy=did_you_mean(key, known))
 
 
 def _parts_of(entries: Mapping[str, Any]) -> tuple[tuple[Part, ...], tuple[float, ...]]:
     """Return the blocks of the entries of a law, and their sampling periods [s]."""
-    require(
-        isinstance(entries, Mapping) and entries,
-        "law",
-        entries,
-        'name at least one signal, such as {"hub_rate": 0.3}',
-    )
+    is_some = isinstance(entries, Mapping) and entries
+    require(is_some, "law", entries, 'name at least one signal, such as {"hub_rate": 0.3}')
     blocks = {name: block_of(_signal(name), entry) for name, entry in entries.items()}
     for name, (block, _) in blocks.items():
         remedy = "has several signals: use Law.of_matrices and name them"
@@ -323,12 +316,9 @@ def _parts_of(entries: Mapping[str, Any]) -> tuple[tuple[Part, ...], tuple[float
 def _signal(name: Any, *, of_reference: bool = False) -> str:
     """Return the name of an output, or of its reference.  Raises ParameterError for other texts."""
     plain = name.removeprefix(REFERENCE) if of_reference and isinstance(name, str) else name
-    require(
-        isinstance(plain, str) and re.fullmatch(r"[A-Za-z_]\w*(@[0-9.eE+-]+)?", plain),
-        "signal",
-        plain,
-        'an output such as hub_rate, or one along the link with its place, "strain@0.05"',
-    )
+    is_name = isinstance(plain, str) and re.fullmatch(r"[A-Za-z_]\w*(@[0-9.eE+-]+)?", plain)
+    remedy = 'an output such as hub_rate, or one along the link with its place, "strain@0.05"'
+    require(is_name, "signal", plain, remedy)
     return str(name)
 
 
@@ -337,7 +327,7 @@ def is_measured(name: str) -> bool:
     return bool(name) and not name.startswith(REFERENCE)
 
 
-def _varied(block: LawBlock, of: str, place: str, value: float, key: str) -> LawBlock:
+def _with_number(block: LawBlock, of: str, place: str, value: float, key: str) -> LawBlock:
     """Return a block with another factor, or another coefficient of its polynomial `of`."""
     if not of:
         return Rational((value,)) if block.is_constant else block.times(value)
@@ -368,18 +358,16 @@ def of_common_blocks(law: Law) -> Law:
         is_shared = part.block.order and part.block.excess <= 0
         key = getattr(part.block, "den", id(part)) if is_shared else id(part)
         alike.setdefault(key, []).append(part)
-    return replace(law, parts=tuple(map(_common, alike.values())))
+    return replace(law, parts=tuple(map(_merge, alike.values())))
 
 
-def _common(parts: Sequence[Part]) -> Part:
-    """Ratios of the same denominator as one block, in observable form: the transpose of each one's states."""
+def _merge(parts: Sequence[Part]) -> Part:
+    """Return ratios of the same denominator as one block, in observable form: the transpose of each one's states."""
     if len(parts) == 1:
         return parts[0]
     A, B, C, D = zip(*(part.block.matrices() for part in parts), strict=True)
-    return Part(
-        tuple(name for part in parts for name in part.signals),
-        StateSpace(A[0].T, np.vstack(C).T, B[0].T, np.hstack(D)),
-    )
+    signals = tuple(chain.from_iterable(part.signals for part in parts))
+    return Part(signals, StateSpace(A[0].T, np.vstack(C).T, B[0].T, np.hstack(D)))
 
 
 def arm_and_law(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
@@ -395,13 +383,11 @@ def arm_and_law(arm: Arm, law: AnyLaw) -> tuple[Arm, AnyLaw]:
 
 def must_not_be_algebraic(arm: Arm, key: str, value: object) -> None:
     """Raise ParameterError where the hub has no inertia: its root moment is the torque itself."""
-    require(
-        not arm.has_massless_hub,
-        key,
-        value,
+    remedy = (
         "with hub.inertia = 0 the root moment is -u itself, so that moment feedback is an algebraic loop; "
-        "give the hub an inertia, or a moment gain of 0",
+        "give the hub an inertia, or a moment gain of 0"
     )
+    require(not arm.has_massless_hub, key, value, remedy)
 
 
 def warn_of_cancellations(law: Law) -> tuple[str, ...]:

@@ -124,9 +124,7 @@ def law_of_table(table: Any, folder: Path) -> Law:
         remedy = f"a signal has a table of its own: [law.{key}] with gain = {value}"
         require(not is_signal, f"law.{key}", value, remedy)
     head = validate_table(LawTable, others, "law")
-    common = head.model_dump(
-        include={"name", "input", "delay", "period", "sign", "references", "rule", "prewarp"}
-    )
+    common = head.model_dump(exclude={"matrices", "system", "signals", "scales"})
     try:
         if head.matrices is not None:
             remedy = "either matrices and signals, or a table for each signal"
@@ -136,8 +134,10 @@ def law_of_table(table: Any, folder: Path) -> Law:
         require(is_alone, "matrices", MISSING, "signals, system and scales need a .mat file")
         entries = {}
         for name, values in signals.items():
-            block = validate_table(SignalTable, values, f"law.{name}")
-            entries[name if block.x is None else f"{name}@{block.x!r}"] = block.build(f"law.{name}")
+            place = f"law.{name}"
+            block = validate_table(SignalTable, values, place)
+            signal = name if block.x is None else f"{name}@{block.x!r}"
+            entries[signal] = block.build(place)
         return Law(entries, **common)
     except ParameterError as error:
         key = error.key if error.key.startswith("law") else f"law.{error.key}"
@@ -152,9 +152,8 @@ def _of_file(head: LawTable, folder: Path, common: dict[str, Any]) -> Law:
     found, _ = read_mat(folder / str(head.matrices), 16 << 20, key="matrices")
     place = ""
     if head.system is not None:
-        must_be_known(
-            "system", head.system, dict.fromkeys(name.split(".")[0] for name in found if "." in name)
-        )
+        structures = dict.fromkeys(name.partition(".")[0] for name in found if "." in name)
+        must_be_known("system", head.system, structures)
         place = f"{head.system}."
     missing = [name for name in "ABCD" if f"{place}{name}" not in found]
     remedy = f"holds no {', '.join(missing)}; it has {list_within(found, 300)} (system = names a structure)"

@@ -2,24 +2,20 @@
 
 import tomllib
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import Any, NamedTuple
+from typing import Any, ClassVar
 
 from tfarm.digits import general
 from tfarm.errors import must_be_known, require
 
 # keys of [link], of which there is one
 SHEAR = ("shear_modulus", "poissons_ratio")
-WORDS = {  # keys of [link] that a material fills: symbol, unit and size of the unit
-    "density": ("ρ", "kg/m^3", 1.0),
-    "youngs_modulus": ("E", "GPa", 1e9),
-    "shear_modulus": ("G", "GPa", 1e9),
-    "poissons_ratio": ("ν", "", 1.0),
-}
 
 
-class Material(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Material:
     """A material: density [kg/m^3], moduli [Pa], source, usual range.  A laminate has a shear modulus, others nu."""
 
     name: str
@@ -30,6 +26,14 @@ class Material(NamedTuple):
     shear_modulus: float | None = None
     poissons_ratio: float | None = None
 
+    # keys of [link] that a material fills: symbol, unit and size of the unit
+    symbols: ClassVar = {
+        "density": ("ρ", "kg/m^3", 1.0),
+        "youngs_modulus": ("E", "GPa", 1e9),
+        "shear_modulus": ("G", "GPa", 1e9),
+        "poissons_ratio": ("ν", "", 1.0),
+    }
+
     @property
     def is_isotropic(self) -> bool:
         """Whether G = E/(2 (1 + nu))."""
@@ -37,11 +41,11 @@ class Material(NamedTuple):
 
     def words(self, keys: Iterable[str]) -> str:
         """Return some of its numbers with their source."""
-        numbers = (
-            f"{WORDS[key][0]} = {general(getattr(self, key) / WORDS[key][2], 6)} {WORDS[key][1]}"
-            for key in keys
-        )
-        return f"material {self.name}: {', '.join(map(str.rstrip, numbers))} ({self.source})"
+        numbers = []
+        for key in keys:
+            symbol, unit, size = self.symbols[key]
+            numbers.append(f"{symbol} = {general(getattr(self, key) / size, 6)} {unit}".rstrip())
+        return f"material {self.name}: {', '.join(numbers)} ({self.source})"
 
 
 @cache
@@ -65,17 +69,27 @@ def of_material(table: Any) -> tuple[Material, dict[str, float]] | None:
     is_right = found.is_isotropic or "poissons_ratio" not in table
     require(is_right, "link.poissons_ratio", table.get("poissons_ratio"), f"{name} {not_isotropic}")
     has_shear = any(key in table for key in SHEAR)
-    lacking = [key for key in WORDS if key not in table and not (key in SHEAR and has_shear)]
-    return found, {key: value for key in lacking if (value := getattr(found, key)) is not None}
+    filled = {}
+    for key in found.symbols:
+        value = getattr(found, key)
+        is_stated = key in table or (key in SHEAR and has_shear)
+        if value is not None and not is_stated:
+            filled[key] = value
+    return found, filled
 
 
 def fill_material(table: Any) -> Any:
     """Return the table of a link with the numbers of its material, if it names one."""
     found = of_material(table)
-    return table if found is None else {**found[1], **table}
+    if found is None:
+        return table
+    return {**found[1], **table}
 
 
 def material_assumptions(tables: Iterable[Mapping[str, Any]]) -> list[str]:
     """Return one assumption for each material of links, with the numbers that are taken from it and their source."""
-    texts = (found[0].words(found[1]) for found in map(of_material, tables) if found is not None and found[1])
+    texts = []
+    for material, numbers in filter(None, map(of_material, tables)):
+        if numbers:
+            texts.append(material.words(numbers))
     return list(dict.fromkeys(texts))

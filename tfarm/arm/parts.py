@@ -13,7 +13,15 @@ from dataclasses import MISSING as NO_DEFAULT
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, Literal, cast
 
-from tfarm.arm.checks import above_zero, check_annotated, extended, not_negative, number, positive, signed
+from tfarm.arm.checks import (
+    above_zero,
+    check_annotated,
+    finite,
+    not_negative,
+    not_negative_or_inf,
+    number,
+    positive,
+)
 from tfarm.errors import MISSING, must_be_known, require
 
 MODULUS = "Young's modulus is a positive, finite number in Pa"
@@ -29,8 +37,18 @@ class NamedShape:
     cowper: Callable[..., float]
 
 
-def cowper_tube(nu: float, *, outer_diameter: float, inner_diameter: float) -> float:
-    """kappa = 6 (1 + nu) (1 + m^2)^2 / ((7 + 6 nu) (1 + m^2)^2 + (20 + 12 nu) m^2),  m = inner/outer."""
+def tube_area(outer_diameter: float, inner_diameter: float) -> float:
+    """Return A = pi (D - d) (D + d)/4."""
+    return math.pi * (outer_diameter - inner_diameter) * (outer_diameter + inner_diameter) / 4
+
+
+def tube_second_moment(outer_diameter: float, inner_diameter: float) -> float:
+    """Return I = pi (D - d) (D + d) (D^2 + d^2)/64 = A (D^2 + d^2)/16."""
+    return tube_area(outer_diameter, inner_diameter) * (outer_diameter**2 + inner_diameter**2) / 16
+
+
+def tube_cowper(nu: float, *, outer_diameter: float, inner_diameter: float) -> float:
+    """Return kappa = 6 (1 + nu) (1 + m^2)^2 / ((7 + 6 nu) (1 + m^2)^2 + (20 + 12 nu) m^2),  m = inner/outer."""
     m2 = (inner_diameter / outer_diameter) ** 2
     return 6 * (1 + nu) * (1 + m2) ** 2 / ((7 + 6 * nu) * (1 + m2) ** 2 + (20 + 12 * nu) * m2)
 
@@ -50,17 +68,9 @@ SHAPES: Mapping[str, NamedShape] = {
     ),
     "tube": NamedShape(
         dimensions=("outer_diameter", "inner_diameter"),
-        area=lambda outer_diameter, inner_diameter: (
-            math.pi * (outer_diameter - inner_diameter) * (outer_diameter + inner_diameter) / 4
-        ),
-        second_moment=lambda outer_diameter, inner_diameter: (
-            math.pi
-            * (outer_diameter - inner_diameter)
-            * (outer_diameter + inner_diameter)
-            * (outer_diameter**2 + inner_diameter**2)
-            / 64
-        ),
-        cowper=cowper_tube,
+        area=tube_area,
+        second_moment=tube_second_moment,
+        cowper=tube_cowper,
     ),
 }
 
@@ -98,28 +108,30 @@ class Section:
 
     @classmethod
     def rectangle(cls, *, width: float, depth: float, shear_factor: float | None = None) -> Section:
-        """A solid rectangle, `depth` [m] in the plane of bending."""
-        return cls._named("rectangle", shear_factor, width=width, depth=depth)
+        """Build a solid rectangle, `depth` [m] in the plane of bending."""
+        return cls._of_shape("rectangle", shear_factor, width=width, depth=depth)
 
     @classmethod
     def round(cls, *, diameter: float, shear_factor: float | None = None) -> Section:
-        """A solid round bar."""
-        return cls._named("round", shear_factor, diameter=diameter)
+        """Build a solid round bar."""
+        return cls._of_shape("round", shear_factor, diameter=diameter)
 
     @classmethod
     def tube(
         cls, *, outer_diameter: float, inner_diameter: float, shear_factor: float | None = None
     ) -> Section:
-        """A round tube."""
-        return cls._named("tube", shear_factor, outer_diameter=outer_diameter, inner_diameter=inner_diameter)
+        """Build a round tube."""
+        sizes = {"outer_diameter": outer_diameter, "inner_diameter": inner_diameter}
+        return cls._of_shape("tube", shear_factor, **sizes)
 
     @classmethod
     def general(cls, *, area: float, second_moment: float, shear_factor: float) -> Section:
-        """Any section, by its numbers."""
+        """Build any section by its numbers."""
         return cls(shape="general", area=area, second_moment=second_moment, shear_factor=shear_factor)
 
     @classmethod
-    def _named(cls, shape: str, shear_factor: float | None, **sizes: float) -> Section:
+    def _of_shape(cls, shape: str, shear_factor: float | None, **sizes: float) -> Section:
+        """Build a named shape."""
         dimensions = {}
         for name, value in sizes.items():
             meaning = f"the {name.replace('_', ' ')} is a positive, finite number of metres"
@@ -145,7 +157,7 @@ class Section:
         return depths[0] / 2 if depths else None
 
     def cowper_factor(self, poissons_ratio: float) -> float:
-        """Cowper's shear factor of a named shape, for a Poisson's ratio in (-1, 0.5]."""
+        """Return Cowper's shear factor of a named shape, for a Poisson's ratio in (-1, 0.5]."""
         return SHAPES[self.shape].cowper(poissons_ratio, **dict(self.dimensions))
 
 
@@ -181,11 +193,11 @@ class Link:
     stated_ratio: float | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        if self.stated_ratio is not None and self.shear_modulus != self.youngs_modulus / (
-            2 * (1 + self.stated_ratio)
-        ):
+        if self.stated_ratio is not None:
+            G = self.youngs_modulus / (2 * (1 + self.stated_ratio))
             # of a link with another modulus
-            object.__setattr__(self, "stated_ratio", None)
+            if self.shear_modulus != G:
+                object.__setattr__(self, "stated_ratio", None)
         check_annotated(self, "link")
         remedy = f"{self.slenderness:.3g} times the section's radius of gyration is no beam; check the units"
         require(self.slenderness <= 1e9, "link.length", self.length, remedy)
@@ -265,11 +277,13 @@ class Link:
 
 def repr_fields(record: Any, always: int) -> dict[str, Any]:
     """Return the first `always` fields of a record's repr, and those of the others that differ from their defaults."""
-    found = {}
-    for i, each in enumerate(known for known in fields(record) if known.repr):
+    found: dict[str, Any] = {}
+    for each in fields(record):
+        if not each.repr:
+            continue
         value = getattr(record, each.name)
         default = each.default if each.default_factory is NO_DEFAULT else each.default_factory()
-        if i < always or value != default:
+        if len(found) < always or value != default:
             found[each.name] = value
     return found
 
@@ -288,7 +302,7 @@ class Hub:
     """
 
     inertia: Annotated[
-        float, extended, "a hub inertia is zero (free pin), positive in kg m^2, or inf (locked)"
+        float, not_negative_or_inf, "a hub inertia is zero (free pin), positive in kg m^2, or inf (locked)"
     ]
     friction: Annotated[
         float, not_negative, "a hub friction is zero or a positive, finite number in N m s/rad"
@@ -440,12 +454,16 @@ class Payload:
     An infinite inertia locks the tip's rotation; `offset` e [m], of any sign, is that of the centre beyond the tip.
     """
 
-    mass: Annotated[float, extended, "a payload mass is zero, positive in kg, or inf (tip pinned)"] = 0.0
+    mass: Annotated[
+        float, not_negative_or_inf, "a payload mass is zero, positive in kg, or inf (tip pinned)"
+    ] = 0.0
     inertia: Annotated[
-        float, extended, "a payload inertia is zero, positive in kg m^2, or inf (tip cannot rotate)"
+        float,
+        not_negative_or_inf,
+        "a payload inertia is zero, positive in kg m^2, or inf (tip cannot rotate)",
     ] = 0.0
     offset: Annotated[
-        float, signed, "a payload's offset is a finite number of metres beyond the tip, negative before it"
+        float, finite, "a payload's offset is a finite number of metres beyond the tip, negative before it"
     ] = 0.0
 
     def __post_init__(self) -> None:

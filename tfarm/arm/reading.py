@@ -15,14 +15,13 @@ from tfarm.errors import ParameterError, did_you_mean, name_file, require, short
 from tfarm.files import read_file
 
 PRESETS = files("tfarm.arm") / "presets"
-# of an arm's file; that of 64 segments has 15 KB
-MOST_ARM_BYTES = 64 * 1024
 
 
 @cache
 def presets() -> tuple[str, ...]:
     """Return the names of the arms that come with tfarm."""
-    return tuple(sorted(p.name.removesuffix(".toml") for p in PRESETS.iterdir() if p.name.endswith(".toml")))
+    names = (each.name for each in PRESETS.iterdir())
+    return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
 
 
 class ArmFile(NamedTuple):
@@ -48,6 +47,8 @@ def load(name_or_path: AnyFile) -> Arm:
 
 def load_tables(name_or_path: AnyFile) -> ArmFile:
     """Return the tables of a preset's name or a path; those of a file that was read already as they are."""
+    # that of an arm of 64 segments has 15 KB
+    most_bytes = 64 * 1024
     if isinstance(name_or_path, ArmFile):
         return name_or_path
     is_named = not isinstance(name_or_path, os.PathLike)
@@ -55,17 +56,20 @@ def load_tables(name_or_path: AnyFile) -> ArmFile:
     is_text = isinstance(name, str) and bool(name.strip()) and "\0" not in name
     require(is_text, "arm", name, f"give a preset ({', '.join(presets())}) or a path")
     if is_named and name in presets():
-        data = PRESETS.joinpath(f"{name}.toml").read_bytes()
         name = f"{name}.toml"
-    elif is_named and not (
-        {"/", "\\", os.sep} & set(name) or name.endswith(".toml") or os.path.lexists(name)
-    ):
+        data = (PRESETS / name).read_bytes()
+    elif is_named and not _is_path(name):
         remedy = f"no such preset: {did_you_mean(name, presets())}; or give the path of a .toml file"
         raise ParameterError(key="arm", value=name, remedy=remedy)
     else:
-        data = read_file(name, MOST_ARM_BYTES, key="arm", what="a .toml file")
+        data = read_file(name, most_bytes, key="arm", what="a .toml file")
     with name_file(name):
         return ArmFile(_table_of(data), name)
+
+
+def _is_path(name: str) -> bool:
+    """Whether a name that is no preset's is a path: by a separator or its ending, or as there is such a file."""
+    return bool({"/", "\\", os.sep} & set(name)) or name.endswith(".toml") or os.path.lexists(name)
 
 
 def decode_text(data: bytes, remedy: str) -> str:
@@ -97,26 +101,18 @@ def _table_of(data: bytes) -> dict[str, Any]:
 
 # ------------------------------------------------------------ plausible values
 
-# Each bound is far outside the range of materials and mechanisms.  A wrong unit (GPa for Pa, mm for m, g/cm^3 for
-# kg/m^3, a damping ratio for seconds) changes a value by a factor of 50 or more.
-MODULUS = (
-    1e5,  # Pa; soft silicone has 3e5
-    "softer than any rubber; its unit is Pa, not in GPa",
-    2e12,  # diamond has 1.2e12
-    "stiffer than diamond; its unit is Pa",
-)
-USUAL = {  # of a segment: least and largest value, each with the warning beyond it
-    "youngs_modulus": MODULUS,
-    "shear_modulus": MODULUS,
-    "density": (
-        25.0,  # kg/m^3; light foam has 30, and in g/cm^3 everything is below 25
-        "lighter than foam; its unit is kg/m^3, not in g/cm^3",
-        25_000.0,  # osmium has 22,600
-        "denser than osmium; its unit is kg/m^3",
-    ),
-    # that of the space station has 17
-    "length": (0.0, "", 100.0, "longer than any arm; its unit is m, not in mm"),
-}
+
+class UsualRange(NamedTuple):
+    """Least and largest value of a number of a segment, each with the warning beyond it.
+
+    Each bound is far outside the range of materials and mechanisms.  A wrong unit (GPa for Pa, mm for m, g/cm^3 for
+    kg/m^3, a damping ratio for seconds) changes a value by a factor of 50 or more.
+    """
+
+    least: float
+    below: str
+    most: float
+    above: str
 
 
 def implausible(arm: Arm) -> tuple[str, ...]:
@@ -124,23 +120,40 @@ def implausible(arm: Arm) -> tuple[str, ...]:
 
     Empty for a plausible arm.
     """
-    keys = [f"link.{i}" for i in range(1, len(arm.links) + 1)] if arm.outer else ["link"]
-    segments = [
-        text for key, link in zip(keys, arm.links, strict=True) for text in _segment(key, link, arm.length)
-    ]
-    return (*segments, *_parts(arm))
+    warnings: list[str] = []
+    for i, link in enumerate(arm.links, 1):
+        key = f"link.{i}" if arm.outer else "link"
+        warnings += _segment_warnings(key, link, arm.length)
+    return (*warnings, *_part_warnings(arm))
 
 
-def _segment(key: str, link: Link, length: float) -> Iterator[str]:
+def _segment_warnings(key: str, link: Link, length: float) -> Iterator[str]:
     """Yield the warnings of a segment of an arm of that length [m], each beginning with its key in the file.
 
     They are of material, size, and the damping ratio C w/2 of the clamped arm in its first mode,
     w = (b/L)^2 sqrt(EI/rhoA).
     """
-    for name, (least, below, most, above) in USUAL.items():
+    soft = "softer than any rubber; its unit is Pa, not in GPa"
+    stiff = "stiffer than diamond; its unit is Pa"
+    light = "lighter than foam; its unit is kg/m^3, not in g/cm^3"
+    dense = "denser than osmium; its unit is kg/m^3"
+    long = "longer than any arm; its unit is m, not in mm"
+    # soft silicone has 3e5 Pa, diamond 1.2e12 Pa
+    modulus = UsualRange(1e5, soft, 2e12, stiff)
+    usual = {
+        "youngs_modulus": modulus,
+        "shear_modulus": modulus,
+        # light foam has 30 kg/m^3, osmium 22,600; in g/cm^3 everything is below 25
+        "density": UsualRange(25.0, light, 25_000.0, dense),
+        # that of the space station has 17 m
+        "length": UsualRange(0.0, "", 100.0, long),
+    }
+    for name, limits in usual.items():
         value = getattr(link, name)
-        if not least <= value <= most:
-            yield f"{key}.{name} = {short_text(value)}: {below if value < least else above}"
+        if value < limits.least:
+            yield f"{key}.{name} = {short_text(value)}: {limits.below}"
+        elif value > limits.most:
+            yield f"{key}.{name} = {short_text(value)}: {limits.above}"
     depth = math.sqrt(12) * link.section.radius_of_gyration
     sides = link.section.dimensions or (("second_moment means a depth of", depth),)
     for name, side in sides:
@@ -156,7 +169,7 @@ def _segment(key: str, link: Link, length: float) -> Iterator[str]:
         )
 
 
-def _parts(arm: Arm) -> Iterator[str]:
+def _part_warnings(arm: Arm) -> Iterator[str]:
     """Yield the warnings of hub, payload, clamp, motor and attachments: values by a ratio to those of the link."""
     # times the link's own mass or inertia
     heaviest = 1e5
@@ -173,7 +186,8 @@ def _parts(arm: Arm) -> Iterator[str]:
     radius = math.sqrt(payload.inertia / payload.mass) if 0.0 < payload.mass < math.inf else 0.0
     heavy = "{:.1g} times the link's; in kg?"
     far = "{:.3g} times the link's length; its unit is m, not mm"
-    limits = [  # key, value, its ratio, the largest ratio, and the warning
+    # key, value, its ratio, the largest ratio, and the warning
+    limits = [
         ("hub.inertia", hub.inertia, hub.inertia / beam, heaviest, "{:.1g} times the link's; in kg m^2?"),
         ("payload.mass", payload.mass, payload.mass / mass, heaviest, heavy),
         (
@@ -189,14 +203,16 @@ def _parts(arm: Arm) -> Iterator[str]:
             "clamp.stiffness",
             arm.clamp.stiffness,
             bending / arm.clamp.stiffness,
-            10.0,  # a usual clamp has a tenth of the flexibility of its link
+            # a usual clamp has a tenth of the flexibility of its link
+            10.0,
             "a clamp {:.2g} times as flexible as its link; its unit is N m/rad",
         ),
         (
             "hub.friction",
             hub.friction,
             hub.friction / (2 * math.sqrt(bending * arm.total_inertia)),
-            50.0,  # beyond it the link cannot turn the hub; a harmonic drive reaches 1
+            # beyond it the link cannot turn the hub; a harmonic drive reaches 1
+            50.0,
             "{:.2g} times the critical damping of the first mode; its unit is N m s/rad, on the hub's side of a gear",
         ),
     ]

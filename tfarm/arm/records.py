@@ -13,7 +13,6 @@ from tfarm.arm.checks import (
     INPUTS,
     THEORIES,
     WITH_ROTARY_INERTIA,
-    WITH_SHEAR,
     Input,
     Theory,
     plain_name,
@@ -59,9 +58,8 @@ class Arm:
         object.__setattr__(self, "name", plain_name(self.name))
         object.__setattr__(self, "assumptions", plain_texts(self.assumptions))
         object.__setattr__(self, "outer", _parts("outer", self.outer, Link, MOST_PARTS - 1))
-        object.__setattr__(
-            self, "attachments", _parts("attachments", self.attachments, Attachment, MOST_PARTS)
-        )
+        attachments = _parts("attachments", self.attachments, Attachment, MOST_PARTS)
+        object.__setattr__(self, "attachments", attachments)
         must_be_known("theory", self.theory, THEORIES)
         must_be_known("input", self.input, INPUTS)
         # of the whole length
@@ -154,9 +152,10 @@ class Arm:
     def is_uniform(self) -> bool:
         """Whether it is an arm as in the paper: one segment on a hub, a payload centred on the tip, no other part."""
         hub = self.hub
-        spare = (self.outer, self.motor, self.attachments, self.payload.offset, self.gauge.x)
-        plain = not any((hub.friction, hub.radius, hub.stiffness, *spare))
-        return plain and self.clamp.is_rigid and self.joint.is_rigid
+        of_hub = (hub.friction, hub.radius, hub.stiffness)
+        others = (self.outer, self.motor, self.attachments, self.payload.offset, self.gauge.x)
+        is_rigid = self.clamp.is_rigid and self.joint.is_rigid
+        return is_rigid and not any(of_hub + others)
 
     @property
     def least_damping(self) -> float:
@@ -172,8 +171,8 @@ class Arm:
     def has_massless_hub(self) -> bool:
         """Whether the hub has no inertia, friction or stiffness, and r = 0: then the root moment is -u."""
         # the gauge measures another moment
-        elsewhere = self.hub.radius, self.gauge.x
-        return not any((self.hub_side_inertia, self.hub.stiffness, self.rate_loss, *elsewhere))
+        places = (self.hub.radius, self.gauge.x)
+        return not any((self.hub_side_inertia, self.hub.stiffness, self.rate_loss, *places))
 
     @property
     def bending_scale(self) -> float:
@@ -220,7 +219,7 @@ class Arm:
     @property
     def has_cutoff(self) -> bool:
         """Whether `shear_cutoff` applies: in Timoshenko's theory alone."""
-        return self.theory in WITH_SHEAR and self.theory in WITH_ROTARY_INERTIA
+        return self.theory == "timoshenko"
 
     # ------------------------------------------------------------ rigid body and motor, at the hub
 
@@ -380,7 +379,8 @@ class Arm:
         return replace(self, hub=replace(self.hub, friction=0.0), motor=motor)
 
 
-ADJUSTABLE = {  # numbers of an arm by name: the part and the field that hold them
+# numbers of an arm by name: the part and the field that hold them
+ADJUSTABLE = {
     "payload_mass": ("payload", "mass"),
     "payload_inertia": ("payload", "inertia"),
     "hub_inertia": ("hub", "inertia"),
@@ -412,12 +412,12 @@ def must_turn(arm: Arm) -> None:
         ("payload.mass", payload.mass),
         ("payload.inertia", payload.inertia),
     )
+    remedy = "an arm that cannot turn has no slew; give finite inertias"
     for key, value in parts:
-        require(
-            not math.isinf(value), key, value, "an arm that cannot turn has no slew; give finite inertias"
-        )
+        require(not math.isinf(value), key, value, remedy)
+    remedy = "an arm with a spring to ground has no slew; leave the spring out"
     for key, value in arm._springs_to_ground():
-        require(value <= 0.0, key, value, "an arm with a spring to ground has no slew; leave the spring out")
+        require(value <= 0.0, key, value, remedy)
 
 
 def _parts(key: str, parts: Any, kind: type[_PartRecord], most: int) -> tuple[_PartRecord, ...]:

@@ -24,14 +24,6 @@ from tfarm.schema import Quantity
 
 _Strict = TypeVar("_Strict", bound="StrictTable")
 _AnyTable = TypeVar("_AnyTable", bound="TomlTable")
-# unit of a limit of the input
-OF_INPUT = "N m, V or A"
-EXPECTED: dict[Any, str] = {
-    float: "a number without quotes, in SI units",
-    str: "a text in double quotes",
-    list[str]: "a list of texts in double quotes",
-    dict[str, Any]: "a table, headed [link.section]",
-}
 # keys before the first table
 AT_THE_TOP = ("name", "assumptions", "theory", "input")
 
@@ -60,6 +52,12 @@ def validate_table(model: type[_Strict], table: Any, place: str) -> _Strict:
 
     Raises ParameterError for anything but a table and for one wrong key, an unknown one before a missing one.
     """
+    expected_types: dict[Any, str] = {
+        float: "a number without quotes, in SI units",
+        str: "a text in double quotes",
+        list[str]: "a list of texts in double quotes",
+        dict[str, Any]: "a table, headed [link.section]",
+    }
     require(isinstance(table, dict), place, table, f"wrong type; give a table, headed [{place}]")
     try:
         return model.model_validate(table)
@@ -72,13 +70,13 @@ def validate_table(model: type[_Strict], table: Any, place: str) -> _Strict:
     value = problem["input"]
     known = model.model_fields
     if word not in known:
-        is_of_top = place and word in AT_THE_TOP
-        if is_of_top:
+        remedy = unknown_key(word, known)
+        if place and word in AT_THE_TOP:
             remedy = f"unknown key; {word} belongs at the top of the file"
-        else:
-            remedy = unknown_key(word, known)
         raise ParameterError(key=key, value=value, remedy=remedy)
-    expected = f"a table, headed [{word}]" if word in ARM_TABLES else EXPECTED.get(known[word].annotation)
+    expected = expected_types.get(known[word].annotation)
+    if word in PART_TABLES:
+        expected = f"a table, headed [{word}]"
     remedy = f"give {expected}" if expected else problem["msg"]
     if problem["type"] == "missing":
         raise ParameterError(key=key, value=MISSING, remedy=remedy)
@@ -179,32 +177,27 @@ class ArmTable(StrictTable):
 SHAPE_TABLES: dict[str, type[TomlTable]] = {
     shape: of(getattr(Section, shape))(SectionTable) for shape in ("rectangle", "round", "tube", "general")
 }
-PARTS = {
-    "hub": Hub,
-    "clamp": RotarySpring,
-    "joint": RotarySpring,
-    "motor": Motor,
-    "gauge": Gauge,
-    "payload": Payload,
-}
 PART_TABLES: dict[str, type[TomlTable]] = {
     "link": LinkTable,
     "attachment": of(Attachment)(TomlTable),
-    **{name: of(makes)(TomlTable) for name, makes in PARTS.items()},
+    "hub": of(Hub)(TomlTable),
+    "clamp": of(RotarySpring)(TomlTable),
+    "joint": of(RotarySpring)(TomlTable),
+    "motor": of(Motor)(TomlTable),
+    "gauge": of(Gauge)(TomlTable),
+    "payload": of(Payload)(TomlTable),
 }
-ARM_TABLES: dict[str, type[StrictTable]] = {"": ArmTable, **PART_TABLES}
 
 
 def arm_of_table(table: dict[str, Any]) -> Arm:
     """Return the arm of a parsed TOML table.  Raises ParameterError for the first problem."""
     # of the loop: read by other rooms
     loop_tables = ("sampling", "converters", "actuator", "slew", "law", "weights")
-    head = validate_table(
-        ArmTable, {key: value for key, value in table.items() if key not in loop_tables}, ""
-    )
+    of_arm = {key: value for key, value in table.items() if key not in loop_tables}
+    head = validate_table(ArmTable, of_arm, "")
     own = head.model_dump(exclude_unset=True)
     parts = parts_of_tables(own)
-    own["assumptions"] = [*head.assumptions, *material_assumptions(_listed(head.link))]
+    own["assumptions"] = [*head.assumptions, *material_assumptions(_link_tables(head.link))]
     return Arm(**{name: own[name] for name in AT_THE_TOP if name in own}, **parts)
 
 
@@ -216,56 +209,60 @@ def parts_of_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if "link" in tables:
         wanted = "a table, headed [link], or [[link]] for each of several"
-        link, *outer = _built("link", _listed(tables["link"]), wanted) or [None]
+        link, *outer = _records("link", _link_tables(tables["link"]), wanted) or [None]
         require(link, "link", MISSING, f"give {wanted}")
         found = {"link": link, "outer": tuple(outer)}
     if "attachment" in tables:
         wanted = "a table for each, headed [[attachment]]"
-        found["attachments"] = tuple(_built("attachment", tables["attachment"], wanted))
-    return found | {name: _within(name, name, tables[name]) for name in PARTS if name in tables}
+        found["attachments"] = tuple(_records("attachment", tables["attachment"], wanted))
+    for name in PART_TABLES:
+        if name in tables and name not in ("link", "attachment"):
+            found[name] = _record(name, name, tables[name])
+    return found
 
 
-def _listed(link: Any) -> Any:
+def _link_tables(link: Any) -> Any:
     """Return the tables of links as a list, also the single [link]."""
     return [link] if isinstance(link, dict) else link
 
 
-def _built(name: str, tables: Any, wanted: str) -> list[Any]:
+def _records(name: str, tables: Any, wanted: str) -> list[Any]:
     """Return the records of a list of tables, which have a number in messages; a single link has none."""
     require(isinstance(tables, list), name, tables, f"wrong type; give {wanted}")
     require(len(tables) <= MOST_PARTS, name, len(tables), f"at most {MOST_PARTS}")
     alone = name == "link" and len(tables) == 1
-    return [_within(name, name if alone else f"{name}.{i}", table) for i, table in enumerate(tables, 1)]
+    return [_record(name, name if alone else f"{name}.{i}", table) for i, table in enumerate(tables, 1)]
 
 
 @cache
 def file_keys() -> dict[str, Quantity]:
     """Return label, unit and meaning of every key of a file: "top.name", "link.section.width", "law.SIGNAL.gain"."""
     tables = tomllib.loads((files("tfarm.arm") / "keys.toml").read_text("utf-8"))
-    return {
-        f"{place}.{key}": Quantity(**words) for place, keys in tables.items() for key, words in keys.items()
-    }
+    found: dict[str, Quantity] = {}
+    for place, keys in tables.items():
+        found |= {f"{place}.{key}": Quantity(**words) for key, words in keys.items()}
+    return found
 
 
 def file_key(key: str, arm: Arm | None = None) -> Quantity:
     """Return label, unit and meaning of a number such as "link.2.section.width", or of a sensor's "gain:1".
 
-    A unit that is that of the arm's input is one of `OF_INPUT` where the arm is given, else all three.
+    The unit of a limit of the input is that of the arm's input where the arm is given, else "N m, V or A".
     """
     words = [word for word in key.partition(":")[0].split(".") if not word.isdecimal()]
     place = ["top" if words[0] in AT_THE_TOP else "sensor"] if len(words) == 1 else []
     found = file_keys()[".".join((*place, *words))]
-    if arm is not None and found.unit == OF_INPUT:
+    if arm is not None and found.unit == "N m, V or A":
         return replace(found, unit=arm.input_unit)
     return found
 
 
-def _within(name: str, place: str, table: Any) -> Any:
+def _record(name: str, place: str, table: Any) -> Any:
     """Return the record of a table; the key of a ParameterError begins with its place in the file."""
+    if name == "link":
+        table = fill_material(table)
     try:
-        return validate_table(
-            PART_TABLES[name], fill_material(table) if name == "link" else table, name
-        ).build()
+        return validate_table(PART_TABLES[name], table, name).build()
     except ParameterError as error:
         key = ".".join((place, *error.key.split(".")[1:]))
         raise ParameterError(key=key, value=error.value, remedy=error.remedy) from None

@@ -20,8 +20,6 @@ from tfarm.arm.schema import file_keys, parts_of_tables
 from tfarm.errors import ParameterError, must_be_known, require
 from tfarm.files import write_file
 
-LINK_NUMBERS = ("length", "density", "youngs_modulus", "shear_modulus", "damping", "poissons_ratio")
-
 
 def to_toml(arm: Arm) -> str:
     """Return the arm as a TOML file; equal arms have equal texts.
@@ -61,11 +59,19 @@ def _link_table(link: Link) -> dict[str, Any]:
     section = link.section
     numbers = dict(section.dimensions) or {"area": section.area, "second_moment": section.second_moment}
     factor = {} if section.shear_factor is None else {"shear_factor": section.shear_factor}
-    other = SHEAR[link.stated_ratio is None]
-    own = {name: getattr(link, name) for name in LINK_NUMBERS if name != other}
-    if other != "poissons_ratio":
+    own = _link_numbers(link)
+    if link.stated_ratio is None:
+        del own["poissons_ratio"]
+    else:
+        del own["shear_modulus"]
         own["poissons_ratio"] = link.stated_ratio
     return {**own, "section": {"shape": section.shape, **numbers, **factor}}
+
+
+def _link_numbers(link: Link) -> dict[str, float]:
+    """Return the numbers of a link by their keys, without those of its section."""
+    names = ("length", "density", "youngs_modulus", "shear_modulus", "damping", "poissons_ratio")
+    return {name: getattr(link, name) for name in names}
 
 
 def law_toml(law: Law) -> str:
@@ -73,7 +79,7 @@ def law_toml(law: Law) -> str:
 
     Raises ParameterError for a law with a state space, whose form is a .mat file, and for two blocks on one signal.
     """
-    names = [name for part in law.parts for name in part.signals]
+    names = law.columns
     require(len(set(names)) == len(names), "law", law.name, "two blocks on one signal: add them up first")
     signals = {part.signals[0]: _signal_table(part) for part in law.parts}
     return toml_text(toml_tables(law_head(law) | signals, "law"))
@@ -117,7 +123,8 @@ def toml_tables(table: Mapping[str, Any], place: str = "", heading: str = "[{}]"
     head = [heading.format(place)] if place else []
     yield [*head, *(f"{key} = {_value(value)}" for key, value in table.items() if key not in inner)]
     for key, tables in inner.items():
-        where = ".".join(filter(None, (place, json.dumps(key) if {*"@."} & {*key} else key)))
+        name = json.dumps(key) if {*"@."} & {*key} else key
+        where = f"{place}.{name}" if place else name
         for each in tables:
             yield from toml_tables(each, where, "[[{}]]" if tables is table[key] else "[{}]")
 
@@ -161,18 +168,18 @@ class KeyedArms:
             here, name = _table_of(table, key)
             if name == "youngs_modulus" and "shear_modulus" in here and self.is_shear_scaled(key):
                 here["shear_modulus"] *= value / here[name]
-            for other in SHEAR if name in SHEAR else ():
-                here.pop(other, None)
+            if name in SHEAR:
+                for other in SHEAR:
+                    here.pop(other, None)
             here[name] = value
         return replace(self.arm, **parts_of_tables(table))
 
     def is_shear_scaled(self, key: str) -> bool:
         """Return whether the shear modulus of a link changes with its Young's modulus, which has that key."""
         place = key.removesuffix("youngs_modulus")
-        is_given = {f"{place}{name}" for name in SHEAR} & {*self.keys}
-        return not is_given and (
-            key not in self.alone or "shear_modulus" not in _table_of(self._table, key)[0]
-        )
+        if any(f"{place}{name}" in self.keys for name in SHEAR):
+            return False
+        return key not in self.alone or "shear_modulus" not in _table_of(self._table, key)[0]
 
     def value(self, key: str) -> float:
         """Return a number of the arm, from its file or its default."""
@@ -184,16 +191,16 @@ def numbers_of(arm: Arm) -> dict[str, float]:
     found: dict[str, float] = {}
     for n, link in enumerate(arm.links, 1):
         place = f"link.{n}" if arm.outer else "link"
-        found |= {f"{place}.{name}": getattr(link, name) for name in LINK_NUMBERS}
+        found |= {f"{place}.{name}": value for name, value in _link_numbers(link).items()}
         section = _link_table(link)["section"]
-        found |= {f"{place}.section.{name}": value for name, value in section.items() if name != "shape"}
+        del section["shape"]
+        found |= {f"{place}.section.{name}": value for name, value in section.items()}
     parts = {name: getattr(arm, name) for name in ("hub", "clamp", "joint", "payload", "motor")}
     parts |= {f"attachment.{n}": each for n, each in enumerate(arm.attachments, 1)}
     for place, part in parts.items():
         if part is not None:
-            found |= {
-                f"{place}.{name}": value for name, value in repr_fields(part, always=MOST_PARTS).items()
-            }
+            numbers = repr_fields(part, always=MOST_PARTS)
+            found |= {f"{place}.{name}": value for name, value in numbers.items()}
     return found
 
 
@@ -222,15 +229,17 @@ def first_file(tables: Mapping[str, Any]) -> str:
         place = lines[0].strip("[]") if lines[0].startswith("[") else "top"
         if place == "link" and "damping" not in tables["link"]:
             lines = [*lines, undamped]
-        text += "".join(["\n", *(f"{_commented(line, place)}\n" for line in lines)])
+        text += "".join(["\n", *(f"{_with_comment(line, place)}\n" for line in lines)])
     return text + (files("tfarm.arm") / "first_file.txt").read_text("utf-8")
 
 
-def _commented(line: str, place: str) -> str:
+def _with_comment(line: str, place: str) -> str:
     """Return a line of a table with unit and meaning of its key, or of the table, where they are declared."""
     # column of a comment, if the value is no longer
     comment_at = 24
     key = line.removeprefix("# ").partition(" = ")[0]
     words = file_keys().get(f"top.{place}" if key.startswith("[") else f"{place}.{key}")
-    unit = f"[{words.unit}] " if words is not None and words.unit else ""
-    return line if words is None else f"{line:<{comment_at}}  # {unit}{words.help}"
+    if words is None:
+        return line
+    unit = f"[{words.unit}] " if words.unit else ""
+    return f"{line:<{comment_at}}  # {unit}{words.help}"

@@ -23,7 +23,7 @@ from tfarm.arm import Arm
 from tfarm.arm.chain import TIME_ROUNDING
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.digits import general
-from tfarm.dsp.simulate import final_value, settling_time
+from tfarm.dsp.simulation import final_value, settling_time
 from tfarm.loop.time_response import TORQUE, Peak
 from tfarm.records import frozen
 from tfarm.response.signals import locate_output
@@ -175,7 +175,7 @@ class SignalCurve(NamedTuple):
         return bool((self.bound <= most).all()) and peak.bound <= most
 
 
-@dataclass(frozen=True)
+@frozen
 class LoopRecord:
     """Times [s] of the signals of a loop, the names of those of hub and tip, root moment and torque, and references.
 

@@ -27,10 +27,11 @@ from tfarm.assessment.card import loops_by_name
 from tfarm.assessment.signal_figures import LoopRecord, LoopResponse, SignalCurve, signal_unit
 from tfarm.case import Case
 from tfarm.dsp import Chain, traces
-from tfarm.dsp.plant import sensed_plant
-from tfarm.dsp.results import ENOUGH_CHANGE, simulate_modes
+from tfarm.dsp.results import simulate_modes
 from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, describe_scenario, rest_scenario, scenario
-from tfarm.dsp.simulate import MOST_BETWEEN, SETTLING_BAND, first_mode
+from tfarm.dsp.sensed import sensed_plant
+from tfarm.dsp.simulate import MOST_BETWEEN, first_mode
+from tfarm.dsp.simulation import SETTLING_BAND
 from tfarm.dsp.stages import admit_case, not_covered
 from tfarm.errors import must_be_known, require
 from tfarm.loop.continuous import ContinuousLoop
@@ -252,9 +253,8 @@ def sampled_response(record: LoopRecord, case: Case, task: Scenario, names: Sequ
     t = record.t[: signals[names[0]].size]
     signals[TORQUE] = traces.held_at(run, run.torque, t)
     curves = {name: SignalCurve(t, y, 0 * y) for name, y in signals.items()}
-    is_converged = used.change is not None and used.change <= ENOUGH_CHANGE
     word = "unstable" if run.stopped else sampled_verdict(case).word
-    return record.of_loop(word, is_converged, f"{used.modes} modes", curves)
+    return record.of_loop(word, used.is_converged, f"{used.modes} modes", curves)
 
 
 def _band_crossings(record: LoopRecord, t: Real, signals: Mapping[str, Real]) -> Real:

@@ -1,4 +1,16 @@
-"""The command line: arguments in, one call, output.  No arithmetic."""
+"""The command line: arguments in, one call, output.  No arithmetic.
+
+app        the application, and the decorator that makes a command of a function
+options    options that commands share, and the arm, law and chain that they name
+output     records as text, JSON, CSV file and picture
+progress   lines on standard error while a command runs
+running    one command from its arguments to its exit code
+arm_files  commands that begin and check an arm's file
+commands   commands on an arm and on measured data
+control    commands on the continuous-time loop and the sampled one
+designing  commands that choose a law, compare, and study uncertain arms
+pages      commands that write pages, give evidence, and help with the others
+"""
 
 import atexit
 import gc

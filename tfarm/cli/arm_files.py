@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,7 +12,10 @@ import typer
 
 import tfarm
 from tfarm.arm.parts import SHAPES
-from tfarm.cli.app import SAMPLING, Png, TheoryName, add_command, advance, emit_record, preset_names, refuse
+from tfarm.cli.app import add_command
+from tfarm.cli.options import SAMPLING, Png, TheoryName, preset_names, refuse
+from tfarm.cli.output import emit_record
+from tfarm.cli.progress import advance
 from tfarm.errors import MISSING, ParameterError, must_be_known, require
 from tfarm.files import write_file
 from tfarm.schema import Quantity
@@ -19,7 +23,7 @@ from tfarm.schema import Quantity
 Size = Annotated[float | None, typer.Option(rich_help_panel="Section")]
 
 
-def entered(option: str, value: Any, text: str, kind: type = float, usual: Any = None) -> Any:
+def value_or_prompt(option: str, value: Any, text: str, kind: type = float, usual: Any = None) -> Any:
     """Return the value of an option, where it is None the answer to a question on a terminal.
 
     Raises ParameterError where standard input is no terminal.
@@ -43,9 +47,9 @@ def link_table(*, material: str | None = None, length: float | None = None) -> d
     """
     from tfarm.arm.materials import materials
 
-    chosen = entered("--material", material, f"material ({', '.join(materials())})", str, "steel")
+    chosen = value_or_prompt("--material", material, f"material ({', '.join(materials())})", str, "steel")
     must_be_known("--material", chosen, materials())
-    return {"length": entered("--length", length, "length of the link [m]"), "material": chosen}
+    return {"length": value_or_prompt("--length", length, "length of the link [m]"), "material": chosen}
 
 
 def section_table(
@@ -77,17 +81,18 @@ def section_table(
     }
     options = {name: f"--{name.replace('_', '-')}" for name in sizes}
     given = [name for name, size in sizes.items() if size is not None]
-    last = (given or ["width"])[-1]
+    last = given[-1] if given else "width"
     shapes = [shape for shape, of in SHAPES.items() if set(given) <= set(of.dimensions)]
     require(shapes, options[last], sizes[last], f"give the sizes of one section: {sections}")
-    shape = shapes[0] if given else entered(options[last], None, f"section: {sections}", str, "rectangle")
+    shape = shapes[0]
+    if not given:
+        shape = value_or_prompt(options[last], None, f"section: {sections}", str, "rectangle")
     must_be_known("section", shape, SHAPES)
-    return {"shape": shape} | {
-        name: entered(
-            options[name], sizes[name], "{0.label} ({0.help}) [m]".format(file_key(f"link.section.{name}"))
-        )
-        for name in SHAPES[shape].dimensions
-    }
+    table = {"shape": shape}
+    for name in SHAPES[shape].dimensions:
+        key = file_key(f"link.section.{name}")
+        table[name] = value_or_prompt(options[name], sizes[name], f"{key.label} ({key.help}) [m]")
+    return table
 
 
 @dataclass(frozen=True)
@@ -126,9 +131,7 @@ class Presets:
 def list_presets() -> Presets:
     """Return the arms that come with tfarm."""
     names = [each.name for each in fields(Preset)]
-    return Presets(
-        [Preset(*(getattr(arm, name) for name in names)) for arm in map(tfarm.load, tfarm.presets())]
-    )
+    return Presets([Preset(*attrgetter(*names)(tfarm.load(preset))) for preset in tfarm.presets()])
 
 
 @add_command(
@@ -171,22 +174,24 @@ def new(
     from tfarm.assessment.arm_check import with_damping
 
     if presets:
-        refuse({"FILE": file and str(file)}, "--list writes no file: leave this out")
+        require(file is None, "FILE", str(file), "--list writes no file: leave this out")
         show(list_presets())
         return
     refuse(
-        {"--json": show.keywords["json"]}, "a file is written: give --list for the arms that come with tfarm"
+        {"json": show.keywords["json"]}, "a file is written: give --list for the arms that come with tfarm"
     )
     if file is None:
         raise ParameterError(key="FILE", value=MISSING, remedy="give a name that ends with .toml, or --list")
     require(file.suffix == ".toml", "FILE", str(file), "give a name that ends with .toml")
     require(force or not os.path.lexists(file), "FILE", str(file), "exists already; --force replaces it")
-    refuse({"--damping-ratio": None if damping is None else damping_ratio}, "give it or --damping, not both")
+    refuse({"damping-ratio": None if damping is None else damping_ratio}, "give it or --damping, not both")
     tables = {
         "name": file.stem,
         "link": ({} if damping is None else {"damping": damping}) | link() | {"section": section()},
         "hub": {
-            "inertia": entered("--hub-inertia", hub_inertia, "inertia of the hub about the axis [kg m^2]")
+            "inertia": value_or_prompt(
+                "--hub-inertia", hub_inertia, "inertia of the hub about the axis [kg m^2]"
+            )
         },
         "payload": {"mass": payload_mass, "inertia": payload_inertia},
         **({} if period is None else {"sampling": {"period": period}}),
@@ -216,5 +221,5 @@ def check(
         from tfarm import plots
         from tfarm.arm import load
 
-        plots.style.save_picture(plots.sketch.figure, load(arm), png)
+        plots.files.save_picture(plots.sketch.figure, load(arm), png)
     show(found, also=(png,))

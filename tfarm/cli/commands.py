@@ -9,27 +9,24 @@ import numpy as np
 import typer
 
 import tfarm
-from tfarm.cli.app import (
+from tfarm.cli.app import add_command
+from tfarm.cli.options import (
     ArmName,
     File,
     InputName,
     Png,
     TheoryName,
-    add_command,
-    advance,
-    emit,
-    emit_loop,
-    emit_record,
+    chain_of_options,
     interval,
     load_arm,
-    load_chain,
     load_loop,
-    named,
+    name_and,
     numbers,
     outputs_on,
-    print_line,
     refuse,
 )
+from tfarm.cli.output import emit, emit_loop, emit_record
+from tfarm.cli.progress import advance, print_line
 from tfarm.errors import require
 
 command = partial(add_command, "Arm")
@@ -40,7 +37,7 @@ RecordName = Annotated[
         metavar="RECORD", exists=True, help="CSV or .mat file: t [s] and signals", show_default=False
     ),
 ]
-pair = named(numbers("KEY=NUMBER,NUMBER", 2))
+pair = name_and(numbers("KEY=NUMBER,NUMBER", 2))
 OWN_TABLE = "--compare prints a table of its own: ask for one of them"
 
 
@@ -63,7 +60,7 @@ def check_method(
     """
     if method != "closed-form" or compare:
         refuse(
-            {"--digits": digits}, "they are certified by balls in any case: leave --method and --compare out"
+            {"digits": digits}, "they are certified by balls in any case: leave --method and --compare out"
         )
         remedy = "at most 2000 by balls or the appendix, which take milliseconds for each"
         require(number <= 2000, "points", number, remedy)
@@ -92,7 +89,7 @@ def modes(
     found = tfarm.modes(load_arm(arm, theory), count)
     method, is_compared, digits = how(len(found))
     if is_compared:
-        refuse({"--certify": certify}, OWN_TABLE)
+        refuse({"certify": certify}, OWN_TABLE)
         show(
             ByMethods(found.arm.name, "natural_frequency", "rad/s", found.index.tolist(), found.by_methods())
         )
@@ -151,10 +148,10 @@ def response(
 
         own = {"s": s, "omega": omega, "output": output, **along.keywords, "digits": how.keywords["digits"]}
         remedy = "a measured response has its own outputs and frequencies; leave this out"
-        refuse({f"--{name}": value for name, value in own.items()}, remedy)
+        refuse(own, remedy)
         show(tfarm.overlay(load_arm(arm, theory), data_of(measured, "--measured")))
         return
-    refuse({"--png": show.keywords["png"]}, "a picture needs --measured; tfarm bode draws the exact response")
+    refuse({"png": show.keywords["png"]}, "a picture needs --measured; tfarm bode draws the exact response")
     from tfarm.response.transfer import ByMethods, values_at
 
     (wanted,), x = along(["root_moment" if output is None else output])
@@ -163,7 +160,7 @@ def response(
     at = places_of(s, omega, (start, stop), points)
     _, is_compared, digits = how(at.size)
     if is_compared:
-        refuse({"--csv": show.keywords["csv"], "--input": driven if G.load else None}, OWN_TABLE)
+        refuse({"csv": show.keywords["csv"], "input": driven if G.load else None}, OWN_TABLE)
         show(ByMethods(G.arm.name, G.outputs[0], G.units[0], at.tolist(), G.by_methods(at)))
         return
     show(values_at(G, at, digits), rows=True)
@@ -171,7 +168,7 @@ def response(
 
 def places_of(s: Any, omega: Any, limits: tuple[float, float], points: int) -> Any:
     """Return the points s [1/s] that are given, or those at frequencies given or between limits [rad/s]."""
-    refuse({"--omega": omega if s else None}, "give --s or --omega, not both")
+    refuse({"omega": omega if s else None}, "give --s or --omega, not both")
     if s:
         return np.array(s)
     if omega is None:
@@ -197,7 +194,7 @@ def bode(
     loop: bool = False,
     along: Any = outputs_on,
     under: Any = load_loop,
-    chain: Any = load_chain,
+    chain: Any = chain_of_options,
     show: Any = emit,
 ) -> None:
     """Bode plot of the exact response, or of the loop function.
@@ -215,20 +212,24 @@ def bode(
     if loop:
         own = {"output": output, "from": start, "to": stop, **along.keywords, "input": driven}
         remedy = "the loop function has no output and its own frequencies; leave this out"
-        refuse({f"--{name}": value for name, value in own.items()}, remedy)
+        refuse(own, remedy)
         emit_loop("loop", arm, under, chain, show)
         return
     from tfarm.response.frequency import resonant_band
 
     of_loop = {**under.keywords["gains"].keywords, "law": under.keywords["law"], **chain.keywords}
     refuse(
-        {f"--{name.replace('_', '-')}": value for name, value in of_loop.items()},
+        of_loop,
         "the loop function: give --loop too",
     )
     subject = load_arm(arm, under.keywords["theory"], driven)
     (wanted,), x = along(["root_moment" if output is None else output])
     low, high = resonant_band(tfarm.transfer(subject, wanted, x=x, input=driven).arm)
-    band = low if start is None else start, high if stop is None else stop
+    if start is not None:
+        low = start
+    if stop is not None:
+        high = stop
+    band = (low, high)
     check_range(*band)
     show(tfarm.bode(subject, wanted, band, x=x, input=driven))
 
@@ -277,7 +278,7 @@ def fit(
     data: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
     free: Annotated[str, typer.Option(metavar="KEY,KEY")] = "",
     start: Annotated[
-        list[Any] | None, typer.Option(metavar="KEY=VALUE", parser=named(numbers("KEY=NUMBER", 1)))
+        list[Any] | None, typer.Option(metavar="KEY=VALUE", parser=name_and(numbers("KEY=NUMBER", 1)))
     ] = None,
     bounds: Annotated[list[Any] | None, typer.Option(metavar="KEY=LO,HI", parser=pair)] = None,
     prior: Annotated[list[Any] | None, typer.Option(metavar="KEY=MEAN,STD", parser=pair)] = None,

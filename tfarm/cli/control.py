@@ -10,28 +10,25 @@ import typer
 import tfarm
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, PLANE, RATE_GAIN, AnyLaw, Arm
 from tfarm.arm.reading import ArmFile
-from tfarm.cli.app import (
+from tfarm.cli.app import add_command
+from tfarm.cli.options import (
     AngleGain,
     ArmName,
     File,
     LawFile,
     TheoryName,
-    add_command,
-    emit,
-    emit_loop,
-    emit_record,
-    given,
+    chain_of_options,
     interval,
+    law_of_options,
     load_arm,
-    load_chain,
     load_driven_loop,
-    load_law,
     load_loop,
-    named,
+    name_and,
     numbers,
-    print_line,
     refuse,
 )
+from tfarm.cli.output import emit, emit_loop, emit_record, has_options
+from tfarm.cli.progress import print_line
 from tfarm.errors import require
 from tfarm.files import mat_content, write_file
 
@@ -87,7 +84,7 @@ def nyquist(*, arm: ArmName, disc: bool = False, loop: Any = load_driven_loop, s
 
 
 @command(epilog="nichols sasaki2012-lab --K1 0.3 --K2 0.3 --png nichols.png")
-def nichols(*, arm: ArmName, loop: Any = load_loop, chain: Any = load_chain, show: Any = emit) -> None:
+def nichols(*, arm: ArmName, loop: Any = load_loop, chain: Any = chain_of_options, show: Any = emit) -> None:
     """Nichols chart of the loop function, with its margins.
 
     Contours are those of the closed loop.  With --period, --delay-samples or --dsp of the sampled loop too.
@@ -96,7 +93,9 @@ def nichols(*, arm: ArmName, loop: Any = load_loop, chain: Any = load_chain, sho
 
 
 @command(epilog="sensitivity sasaki2012-lab --K1 0.3 --K2 0.3 --png sensitivity.png")
-def sensitivity(*, arm: ArmName, loop: Any = load_loop, chain: Any = load_chain, show: Any = emit) -> None:
+def sensitivity(
+    *, arm: ArmName, loop: Any = load_loop, chain: Any = chain_of_options, show: Any = emit
+) -> None:
     """Sensitivity S, complementary sensitivity T, peaks Ms and Mt.
 
     S = 1/(1 + L) and T = L/(1 + L).  With --period, --delay-samples or --dsp of the sampled loop too.
@@ -163,7 +162,7 @@ def map_plane(
     kp: AngleGain = 0.0,
     points: Annotated[int | None, typer.Option(min=2, max=2000)] = None,
     law: LawFile = None,
-    vary: Annotated[list[Any] | None, typer.Option(parser=named(interval), metavar="NAME=LO,HI")] = None,
+    vary: Annotated[list[Any] | None, typer.Option(parser=name_and(interval), metavar="NAME=LO,HI")] = None,
 ) -> tuple[AnyLaw, dict[str, Any]]:
     """Return the law of a map, and the values of two of its numbers, by name.
 
@@ -180,11 +179,11 @@ def map_plane(
     typed = {RATE_GAIN: k1, MOMENT_GAIN: k2}
     if vary or law:
         remedy = "leave it out: of a law the map is over two of its own numbers, --vary NAME=LO,HI twice"
-        refuse({f"--{name}": value for name, value in {**typed, ANGLE_GAIN: kp or None}.items()}, remedy)
+        refuse({**typed, ANGLE_GAIN: kp or None}, remedy)
         ranges = dict(vary or [])
         remedy = "give two numbers of the law, such as --vary hub_angle=0,10 --vary delay=0,0.02"
         require(len(ranges) == 2, "--vary", [name for name, _ in vary or []], remedy)
-        controller, _ = load_law(file, arm, {}, law)
+        controller, _ = law_of_options(file, arm, {}, law)
     else:
         ranges = {name: typed[name] or usual for name, usual in zip(PLANE, ranges_of(arm), strict=True)}
         controller = tfarm.default_gains(arm).having(ANGLE_GAIN, kp)
@@ -198,7 +197,7 @@ def gain_map(
     arm: ArmName,
     plane: Any = map_plane,
     theory: TheoryName = None,
-    chain: Any = load_chain,
+    chain: Any = chain_of_options,
     show: Any = emit,
 ) -> None:
     """Stability region in the plane of two gains, with its boundary.
@@ -214,7 +213,7 @@ def gain_map(
     controller, axes = plane(arm, subject)
     names: Any = tuple(axes)
     x, y = axes.values()
-    if given(chain):
+    if has_options(chain):
         loop = sampled_verdict(tfarm.Case(subject, controller, chain(arm))).full
         found: Any = sampled_map(loop, x, y, vary=names)
     else:
@@ -228,7 +227,7 @@ def sampled(
     arm: ArmName,
     modes: ModelOrder = None,
     loop: Any = load_loop,
-    chain: Any = load_chain,
+    chain: Any = chain_of_options,
     show: Any = emit_record,
 ) -> None:
     """Stability, intervals, modes and margins of the sampled loop.
@@ -253,10 +252,10 @@ def norm(
     *,
     arm: ArmName,
     weight: Annotated[
-        list[Any] | None, typer.Option(parser=named(weight_entry), metavar="NAME=NUM/DEN")
+        list[Any] | None, typer.Option(parser=name_and(weight_entry), metavar="NAME=NUM/DEN")
     ] = None,
     loop: Any = load_loop,
-    chain: Any = load_chain,
+    chain: Any = chain_of_options,
     show: Any = emit_record,
 ) -> None:
     """H-infinity norms of weighted S, K S and T, with upper bounds.
@@ -284,7 +283,7 @@ def step(
     output: Annotated[list[str] | None, typer.Option(metavar="NAME")] = None,
     settling_band: float = 0.02,
     loop: Any = load_loop,
-    chain: Any = load_chain,
+    chain: Any = chain_of_options,
     show: Any = emit,
 ) -> None:
     """Time response: rise, overshoot, settling, residual vibration.
@@ -316,7 +315,7 @@ def simulate(
     animate: File = None,
     controller: Annotated[Path | None, typer.Option(metavar="FILE", exists=True)] = None,
     loop: Any = load_loop,
-    chain: Any = load_chain,
+    chain: Any = chain_of_options,
     show: Any = emit,
 ) -> None:
     """Time response of the sampled loop, exact between the samples.
@@ -359,7 +358,7 @@ def simulate(
 
 
 def matlab_signals(found: Any) -> dict[str, Any]:
-    """The signals of a run under names that MATLAB takes, strain_0_05 of strain@0.05; those between samples apart."""
+    """Return the signals of a run under MATLAB's names, strain_0_05 of strain@0.05; those between samples apart."""
     name = partial(re.sub, r"\W", "_")
     signals: dict[str, Any] = {name(key): values for key, values in found.signals.items() if len(values)}
     if found.between:

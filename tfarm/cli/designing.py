@@ -12,7 +12,8 @@ import typer
 import tfarm
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, TWO_GAINS
 from tfarm.arm.reading import ArmFile
-from tfarm.cli.app import (
+from tfarm.cli.app import add_command
+from tfarm.cli.options import (
     CONTROLLER,
     AngleGain,
     ArmName,
@@ -21,23 +22,20 @@ from tfarm.cli.app import (
     ModeCount,
     Png,
     TheoryName,
-    add_command,
-    advance,
-    emit,
-    emit_record,
-    given_gains,
+    chain_of_options,
+    gains_of_options,
     interval,
+    law_of_options,
     load_arm,
-    load_chain,
-    load_law,
     load_loop,
-    named,
+    name_and,
     numbers,
     preset_names,
-    print_line,
     read_arms,
     refuse,
 )
+from tfarm.cli.output import emit, emit_record
+from tfarm.cli.progress import advance, print_line
 from tfarm.errors import require
 
 command = partial(add_command, "Design")
@@ -65,11 +63,11 @@ def design(
     continuous: bool = False,
     also: Annotated[list[Any] | None, typer.Option(metavar="ARM", parser=str, callback=read_arms)] = None,
     over: Annotated[
-        list[Any] | None, typer.Option("--range", parser=named(interval), metavar="KEY=LO,HI")
+        list[Any] | None, typer.Option("--range", parser=name_and(interval), metavar="KEY=LO,HI")
     ] = None,
     save: File = None,
     theory: TheoryName = None,
-    chain: Any = load_chain,
+    chain: Any = chain_of_options,
     show: Any = emit_record,
 ) -> None:
     """Law of a structure with the best objective in the sampled loop.
@@ -116,12 +114,12 @@ def export(
     precision: str = "double",
     ranges: Annotated[
         list[Any] | None,
-        typer.Option("--range", parser=named(numbers("SIGNAL=VALUE", 1)), metavar="SIGNAL=VALUE"),
+        typer.Option("--range", parser=name_and(numbers("SIGNAL=VALUE", 1)), metavar="SIGNAL=VALUE"),
     ] = None,
     name: str = "",
     anyway: Annotated[bool, typer.Option("--anyway")] = False,
     loop: Any = load_loop,
-    chain: Any = load_chain,
+    chain: Any = chain_of_options,
     show: Any = emit_record,
 ) -> None:
     """C code, FMU, MATLAB or Python files of controller, plant, loop.
@@ -229,7 +227,7 @@ def tune(
     save: File = None,
     theory: TheoryName = None,
     plan: Any = tuner_plan,
-    chain: Any = load_chain,
+    chain: Any = chain_of_options,
     show: Any = emit_record,
 ) -> None:
     """Neural tuner of the moment gain, compared with baselines.
@@ -249,7 +247,7 @@ def tune(
     subject = load_arm(arm, theory)
     sampling = chain(arm)
     typed = {MOMENT_GAIN: 0.0} if k1 is None else {RATE_GAIN: k1, MOMENT_GAIN: 0.0}
-    law, defaults = load_law(arm, subject, typed)
+    law, defaults = law_of_options(arm, subject, typed)
     rate = cast("tfarm.HubFeedback", law)[RATE_GAIN]
     if k1 is None and kp:
         rate = trial.usual_rate_gain(subject, kp)
@@ -290,8 +288,8 @@ def compare(
     theory: TheoryName = None,
     png: Png = None,
     out: Annotated[Path | None, typer.Option(metavar="FOLDER")] = None,
-    gains: Any = given_gains,
-    chain: Any = load_chain,
+    gains: Any = gains_of_options,
+    chain: Any = chain_of_options,
     show: Any = emit_record,
 ) -> None:
     """Two arms, or two laws on one arm: modes, poles, margins.
@@ -305,9 +303,11 @@ def compare(
     subjects = [load_arm(file, theory) for file in arms]
     files = read_arms(law or [])
     if files:
-        laws = [load_law(arms[0], subjects[0], gains(), file)[0] for file in files]
+        laws = [law_of_options(arms[0], subjects[0], gains(), file)[0] for file in files]
     else:
-        laws = [load_law(file, subject, gains())[0] for file, subject in zip(arms, subjects, strict=True)]
+        laws = [
+            law_of_options(file, subject, gains())[0] for file, subject in zip(arms, subjects, strict=True)
+        ]
     stems = [Path(each.name).stem for each in files]
     candidates = ([each.name for each in subjects], stems, [each.name for each in files])
     names = next((each for each in candidates if len(set(each)) == 2), ())
@@ -323,7 +323,7 @@ def compare(
 # ------------------------------------------------------------ studies of uncertain arms
 
 
-def varied(text: str) -> dict[str, list[float]]:
+def parse_distribution(text: str) -> dict[str, list[float]]:
     """Return the kind and the numbers of KIND:NUMBER,NUMBER."""
     kind, _, values = text.partition(":")
     form = "KIND:NUMBERS, such as uniform:0,0.2, normal:0.1,0.01, grid:0,1,11 or values:0.1,0.2"
@@ -344,12 +344,12 @@ def study_arguments(
 
     Raises ParameterError for both.
     """
-    from tfarm.studies.study import load_study
+    from tfarm.studies.declaration import load_study
 
     # an arm's file names no arm
     if "arm" in file.tables:
         refuse(
-            {f"--{key}": value for key, value in typed.items()},
+            typed,
             f"the study is that of {file.name}; leave this out",
         )
         return load_study(file), None
@@ -365,7 +365,9 @@ def study(
     *,
     arm: ArmName,
     out: Annotated[Path, typer.Option(metavar="DIR", show_default=False)],
-    over: Annotated[list[Any] | None, typer.Option(metavar="KEY=KIND:NUMBERS", parser=named(varied))] = None,
+    over: Annotated[
+        list[Any] | None, typer.Option(metavar="KEY=KIND:NUMBERS", parser=name_and(parse_distribution))
+    ] = None,
     ask: Annotated[str | None, typer.Option(metavar="QUANTITY,...")] = None,
     draws: int | None = None,
     seed: int | None = None,
@@ -378,7 +380,7 @@ def study(
     stop_after: Annotated[float | None, typer.Option(min=0)] = None,
     report: Annotated[bool, typer.Option("--report")] = False,
     loop: Any = load_loop,
-    chain: Any = load_chain,
+    chain: Any = chain_of_options,
     show: Any = emit,
 ) -> None:
     """Many uncertain arms: stable share, distributions, worst arm.
@@ -424,7 +426,7 @@ def study(
         )
     page = None
     if report:
-        from tfarm.report.writing import write_study
+        from tfarm.report.study_page import write_study
 
         page = write_study(found)
     show(found, None if any(key.startswith("law.") for key in keys) else defaults, also=(page,))

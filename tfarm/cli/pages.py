@@ -8,22 +8,20 @@ import typer
 from typer.completion import get_completion_script  # type: ignore[attr-defined]  # Typer does not list it
 
 import tfarm
-from tfarm.cli.app import (
+from tfarm.cli.app import add_command, app
+from tfarm.cli.options import (
     ArmName,
     LawFiles,
     TheoryName,
-    add_command,
-    advance,
-    app,
-    emit_record,
-    given_gains,
+    chain_of_options,
+    gains_of_options,
+    law_of_options,
     load_arm,
-    load_chain,
-    load_law,
     preset_names,
-    print_line,
     read_arms,
 )
+from tfarm.cli.output import emit_record
+from tfarm.cli.progress import advance, print_line
 from tfarm.errors import must_be_known
 
 command = partial(add_command, "Report")
@@ -54,8 +52,8 @@ def report(
     theory: TheoryName = None,
     measured: Annotated[list[str] | None, typer.Option(metavar="OUTPUT/INPUT=FILE")] = None,
     paper: Annotated[bool, typer.Option("--paper")] = False,
-    gains: Any = given_gains,
-    chain: Any = load_chain,
+    gains: Any = gains_of_options,
+    chain: Any = chain_of_options,
 ) -> None:
     """Pages with pictures, tables and data, to read in a browser.
 
@@ -69,10 +67,10 @@ def report(
     paper: each figure as a PDF at the width of a paper's column too, which takes about a quarter longer
     """
     from tfarm.fitting import data, recording
-    from tfarm.report import page, write, writing
+    from tfarm.report import page, sections, write
 
     if only is not None:
-        must_be_known("--only", only, writing.QUESTIONS)
+        must_be_known("--only", only, sections.QUESTIONS)
     files = read_arms(arms or tfarm.presets())
     others = read_arms(law or [])
     subjects = [load_arm(file, theory) for file in files]
@@ -81,12 +79,14 @@ def report(
         if others:
             runs = [
                 page.GivenLaw(
-                    load_law(file, arm, gains(), each)[0], Path(each.name).name, recording.load_run(each)
+                    law_of_options(file, arm, gains(), each)[0],
+                    Path(each.name).name,
+                    recording.load_run(each),
                 )
                 for each in others
             ]
         elif "law" in file.tables or gains():
-            runs = [page.GivenLaw(load_law(file, arm, gains())[0])]
+            runs = [page.GivenLaw(law_of_options(file, arm, gains())[0])]
         else:
             runs = []
         laws.append(runs)

@@ -6,7 +6,7 @@ import sys
 import tomllib
 from difflib import get_close_matches
 from functools import cache
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,8 @@ import typer
 from typer.exceptions import TyperException
 
 from tfarm.cli import arm_files, commands, control, designing, pages  # noqa: F401  each adds its commands
-from tfarm.cli.app import app, discard, print_line, progress
+from tfarm.cli.app import app
+from tfarm.cli.progress import discard, print_line, progress
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, require
 from tfarm.files import STANDARD_OUTPUT
 
@@ -143,13 +144,13 @@ def open_streams() -> None:
 
 def check_words(arguments: list[str]) -> None:
     """Raise ParameterError for 5_0, Python's own spelling, an empty path, and a "-" that is no file or one of two."""
-    words = [
-        word for argument in arguments for word in argument.split("=", 1 if argument.startswith("--") else 0)
-    ]
+    words: list[str] = []
+    for argument in arguments:
+        words += argument.split("=", 1 if argument.startswith("--") else 0)
     options = [(option, text) for option, text in pairwise(words) if option.startswith("--")]
-    takers = [option for option, text in options if text == STANDARD_OUTPUT] + ["--json"] * (
-        "--json" in words
-    )
+    takers = [option for option, text in options if text == STANDARD_OUTPUT]
+    if "--json" in words:
+        takers.append("--json")
     files = [text for option, text in options if option in WRITTEN and text != STANDARD_OUTPUT]
     for option, text in options:
         if option not in PATHS:
@@ -175,10 +176,9 @@ def usage(error: Any) -> str:
     text = error.format_message()
     if text.startswith("No such option"):
         name = error.option_name
-        known = [option for each in error.ctx.command.params for option in each.opts]
-        meant = [
-            option for option, others in hints()["options"].items() if name in others and option in known
-        ]
+        known = [*chain.from_iterable(each.opts for each in error.ctx.command.params)]
+        alike = [option for option, others in hints()["options"].items() if name in others]
+        meant = [option for option in alike if option in known]
         if meant:
             return f"No such option: {name}. Did you mean {' or '.join(meant)}?"
         return text + hints()["other_commands"].get(name, "")

@@ -1,6 +1,10 @@
 """Crossings of a curve by zeros of A + g B along a real gain g, and counts of zeros beyond it (D-decomposition).
 
 The curve may be the imaginary axis or the unit circle, and A and B any functions.
+
+line     crossings along lines of one gain, and the intervals and counts between them
+shown    a plane of two numbers with its counts of unstable poles
+turning  values between those of a gain, so that its curves are drawn smooth
 """
 
 from tfarm.crossing.line import (
@@ -46,13 +50,12 @@ __all__ = [
 ]
 
 # names up to version 1.0
-_LINE = "tfarm.crossing.line"
 __getattr__ = moved(
     __name__,
     {
-        "ascending": f"{_LINE}:check_ascending",
-        "confirmed": f"{_LINE}:confirm_intervals",
-        "crossed": f"{_LINE}:locate_crossings",
-        "joined": f"{_LINE}:join_neighbours",
+        "ascending": "tfarm.crossing.line:check_ascending",
+        "confirmed": "tfarm.crossing.line:confirm_intervals",
+        "crossed": "tfarm.crossing.line:locate_crossings",
+        "joined": "tfarm.crossing.line:join_neighbours",
     },
 )

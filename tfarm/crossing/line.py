@@ -53,8 +53,8 @@ class Crossings:
     def of(cls, found: Iterable[tuple[float, float, int]]) -> Crossings:
         """Collect crossings, without those at no finite gain."""
         rows = sorted((float(t), float(at), int(change)) for t, at, change in found if np.isfinite(t))
-        gain, at, change = zip(*rows, strict=True) if rows else ((), (), ())
-        return cls(np.array(gain, dtype=float), np.array(at, dtype=float), np.array(change, dtype=np.int64))
+        gain, at, change = np.reshape(rows, (-1, 3)).T.copy()
+        return cls(gain, at, change.astype(np.int64))
 
     def __iter__(self) -> Iterator[Crossing]:
         rows = zip(self.gain.tolist(), self.at.tolist(), self.change.tolist(), strict=True)
@@ -64,21 +64,21 @@ class Crossings:
         return self.gain.size
 
     def within(self, low: float, high: float) -> Crossings:
-        """The crossings at gains between two."""
+        """Return the crossings at gains between two."""
         inside = (low < self.gain) & (self.gain < high)
         return Crossings(self.gain[inside], self.at[inside], self.change[inside])
 
     def spans(self, low: float, high: float) -> list[Window]:
-        """The intervals between two gains from each crossing to the next."""
+        """Return the intervals between two gains from each crossing to the next."""
         return list(pairwise(np.unique(np.r_[low, self.within(low, high).gain, high]).tolist()))
 
     def passed(self, gains: Real | float) -> Whole:
-        """Number of zeros that pass beyond the curve between -infinity and each of the gains, inclusive."""
+        """Return the number of zeros that pass beyond the curve between -infinity and each of the gains, inclusive."""
         return np.r_[0, np.cumsum(self.change)][np.searchsorted(self.gain, gains, side="right")]
 
 
 def brackets(h: Real) -> tuple[tuple[Whole, ...], Whole]:
-    """Changes of sign of h (..., points) between neighbours: indices of the first, and the change of the count.
+    """Return changes of sign of h (..., points) between neighbours: indices of the first, and the change of the count.
 
     2 more zeros beyond the curve where h falls, 2 fewer where it rises, the mirror image counted.  A point at which h
     is exactly 0 has the sign of the next.
@@ -123,7 +123,7 @@ class Line(NamedTuple):
 
     @classmethod
     def of(cls, weights: Real, unit: Real, value: float, low: float, high: float) -> Line:
-        """The line of a number with this value in a law: one unit of it adds `unit` to the weights."""
+        """Build the line of a number with this value in a law: one unit of it adds `unit` to the weights."""
         return cls(weights - value * unit, unit, low, high)
 
 
@@ -168,7 +168,7 @@ class Grid:
 
 
 def locate_crossings(places: Real, parts: Parts) -> tuple[Real, Real, Whole]:
-    """Gain, place and change of the count (n,) of every crossing between neighbours of a grid of places, ascending."""
+    """Return gain, place and change of the count (n,) of every crossing between neighbours of a grid of places."""
     curve = Grid(places, lambda at: np.array(parts(at)))
     (found,) = crossings(curve, [Line(np.array([1.0, 0.0]), np.array([0.0, 1.0]), -np.inf, np.inf)])
     gain, at, change = np.reshape(found, (-1, 3)).T
@@ -176,7 +176,7 @@ def locate_crossings(places: Real, parts: Parts) -> tuple[Real, Real, Whole]:
 
 
 def crossings(curve: Curve, lines: Sequence[Line], *, with_dips: bool = False) -> list[list[Crossing]]:
-    """The crossings of each line by pairs between neighbours of the curve's grid, all solved for at once.
+    """Return the crossings of each line by pairs between neighbours of the curve's grid, all solved for at once.
 
     `with_dips`, on a `Grid`: those too of which two lie between neighbours, where |h| dips through 0.
     """
@@ -208,9 +208,8 @@ def crossings(curve: Curve, lines: Sequence[Line], *, with_dips: bool = False) -
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         gain = -(A * B.conj()).real / abs(B) ** 2
     found: list[list[Crossing]] = [[] for _ in lines]
-    for number, *each in zip(
-        line.tolist(), gain.tolist(), (origin + at).tolist(), change.tolist(), strict=True
-    ):
+    rows = zip(line.tolist(), gain.tolist(), (origin + at).tolist(), change.tolist(), strict=True)
+    for number, *each in rows:
         found[number].append(Crossing(*each))
     return found
 
@@ -218,7 +217,7 @@ def crossings(curve: Curve, lines: Sequence[Line], *, with_dips: bool = False) -
 def _dips(
     parts: Callable[[Real, Whole, Whole], tuple[Complex, Complex]], curve: Curve, share: Real
 ) -> tuple[Whole, Real, Real, Real, Whole]:
-    """Dips of |h| through 0 between three neighbours: the line, the first place, one beyond 0, the last, and the sign.
+    """Return dips of |h| through 0 between three neighbours: line, first place, one beyond 0, last place, and sign.
 
     Two crossings lie there, as near to each other as a resonance is narrow, and h has one sign at the points of the
     grid.  The least of all dips are found together, by SciPy's Chandrupatla (1998).
@@ -226,12 +225,13 @@ def _dips(
     # of |A| |B|: an imaginary part that may be rounding
     rounded = 1e-11
     inner = share[:, 1:-1]
-    signs = np.sign(share[:, 1:-1])
+    signs = np.sign(inner)
     # of the neighbours: below 0 where one is across
     lower = np.minimum(signs * share[:, :-2], signs * share[:, 2:])
     line, before = np.nonzero((abs(inner) <= lower) & (abs(inner) > rounded))
     sign = signs[line, before].astype(np.int64)
-    (first, middle, *_), (_, last, *_) = curve.steps(before), curve.steps(before + 1)
+    first, middle, *_ = curve.steps(before)
+    last = curve.steps(before + 1).high
     if not line.size:
         return line, first, first, last, sign
 
@@ -245,7 +245,7 @@ def _dips(
 
 
 def _share(A: Complex, B: Complex) -> Real:
-    """h over its largest possible size, -1 to 1."""
+    """Return h over its largest possible size, -1 to 1."""
     return np.asarray((A * B.conj()).imag / np.maximum(abs(A) * abs(B), LEAST_SIZE))
 
 
@@ -256,11 +256,12 @@ def check_ascending(name: str, values: Any, least: int, most: int) -> Real:
     except (TypeError, ValueError):
         # no numbers
         values = np.empty(0)
-    ascends = least <= values.size <= most and np.isfinite(values).all() and (np.diff(values) > 0).all()
+    ascends = np.isfinite(values).all() and (np.diff(values) > 0).all()
+    is_right = least <= values.size <= most and ascends
     remedy = (
         f"an ascending range of {least} to {most} finite values (give the law as law=, its numbers as vary=)"
     )
-    require(ascends, name, f"{values.size} values", remedy)
+    require(is_right, name, f"{values.size} values", remedy)
     return np.asarray(values)
 
 

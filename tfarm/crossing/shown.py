@@ -83,9 +83,8 @@ class PlaneOfCounts(ABC):
         columns = [
             Column(name.replace(".", "_").replace("@", "_at_"), of=values.ravel()) for name, values in pairs
         ]
-        return Table(
-            columns=(*columns, Column("unstable_roots", of=[count for row in self.counts for count in row]))
-        )
+        columns.append(Column("unstable_roots", of=itertools.chain(*self.counts)))
+        return Table(columns=tuple(columns))
 
     @property
     def drawing(self) -> str:
@@ -95,10 +94,10 @@ class PlaneOfCounts(ABC):
         up = max(1, self.y.size // most_lines)
         across = max(1, self.x.size // most_characters)
         rows = list(zip(self.y, self.counts, strict=True))[::-up]
-        lines = [
-            f"{value:9.3g} " + "".join("#" if count else "." for count in row[::across])
-            for value, row in rows
-        ]
+        lines = []
+        for value, row in rows:
+            marks = "".join("#" if count else "." for count in row[::across])
+            lines.append(f"{value:9.3g} {marks}")
         name, other = self.vary
         legend = f"{other} up, {name} from {self.x[0]:g} to {self.x[-1]:g} to the right; . stable, # unstable"
         return "\n".join([*lines, legend])

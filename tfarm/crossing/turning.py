@@ -19,10 +19,8 @@ from numpy.typing import NDArray
 from tfarm.arrays import Complex, Real
 from tfarm.crossing.line import Window
 
-# how much wider than high, or higher than wide, a picture is at most: so much more a curve turns in it
-STRETCH = 2.0
-# from one piece of a curve to the next, where the picture is as high as wide
-MOST_TURN = math.radians(5.0) / STRETCH
+# from one piece of a curve to the next: a sharper turn is a corner
+MOST_TURN = math.radians(5.0)
 # of the picture, a pixel: corners of shorter pieces are invisible
 PIXEL = 2e-3
 # a value of the gain across, and an interval of the other there
@@ -34,6 +32,8 @@ def loose(curves: Complex, width: Real | float, height: Real | float) -> NDArray
 
     `width` and `height` are numbers, or columns (b, 1).  None is needed where a curve is NaN or real.
     """
+    # how much wider than high, or higher than wide, a picture is at most: so much more a curve turns in it
+    stretch = 2.0
     piece = np.diff(curves.real / width + 1j * (curves.imag / height), axis=1)
     size = abs(piece)
     is_real = curves.imag == 0
@@ -41,7 +41,7 @@ def loose(curves: Complex, width: Real | float, height: Real | float) -> NDArray
         turn = abs(np.angle(piece[:, 1:] / piece[:, :-1]))
     parts = is_real[:, 1:] != is_real[:, :-1]
     stays = is_real[:, 2:] & is_real[:, 1:-1] & is_real[:, :-2]
-    bent = np.isfinite(turn) & (turn > MOST_TURN) & ~(stays | parts[:, 1:] | parts[:, :-1])
+    bent = np.isfinite(turn) & (turn > MOST_TURN / stretch) & ~(stays | parts[:, 1:] | parts[:, :-1])
     wanted = parts.copy()
     wanted[:, :-1] |= bent
     wanted[:, 1:] |= bent
@@ -49,7 +49,7 @@ def loose(curves: Complex, width: Real | float, height: Real | float) -> NDArray
 
 
 def loose_columns(across: Real, parts: Sequence[RegionPiece], drawn: Callable[[Real, Real], Complex]) -> Real:
-    """Values of a gain between columns (n,) of a region, next to corners of the outlines of its parts.
+    """Return values of a gain between columns (n,) of a region, next to corners of the outlines of its parts.
 
     `drawn` maps a point of the plane to the picture, 1 high and about as wide; corners outside are left out.
     """
@@ -64,19 +64,22 @@ def loose_columns(across: Real, parts: Sequence[RegionPiece], drawn: Callable[[R
         before = outline - np.roll(outline, 1)
         after = np.roll(outline, -1) - outline
         is_seen = (outline.real > 0) & (outline.imag > 0) & (outline.imag < 1)
-        is_corner = is_seen & (abs(np.angle(after / before)) > STRETCH * MOST_TURN)
+        is_corner = is_seen & (abs(np.angle(after / before)) > MOST_TURN)
         for way, side in ((1, before), (-1, after)):
-            sides = np.transpose([gain, np.roll(gain, way)])[is_corner & (abs(side) > PIXEL)]
-            wanted.update(each for ends in sides.tolist() for each in _halves(across, *ends))
+            is_long = is_corner & (abs(side) > PIXEL)
+            for ends in zip(gain[is_long].tolist(), np.roll(gain, way)[is_long].tolist(), strict=True):
+                wanted.update(_halves(across, *ends))
     return np.array(sorted(wanted))
 
 
 def _halves(across: Real, here: float, other: float) -> list[float]:
-    """Nearly half way between two columns; of an upright side, to its neighbours."""
+    """Return values nearly half way between two columns; of an upright side, to its neighbours."""
     n = int(np.searchsorted(across, here))
     neighbours = across[max(0, n - 1) : n + 2].tolist()
     # 1e-11 of a gain: columns nearer to each other are in the rounding of the end of a region
-    ends = [each for each in neighbours if abs(each - here) > 1e-11 * abs(here)] if here == other else [other]
+    ends = [other]
+    if here == other:
+        ends = [each for each in neighbours if abs(each - here) > 1e-11 * abs(here)]
     # 0.45 of the way from one column to the next: half way may be the very edge that both were laid around
     return [min(here, each) + 0.45 * abs(each - here) for each in ends]
 
@@ -126,7 +129,7 @@ def pieces(across: Real, intervals: Sequence[Sequence[Window]]) -> list[RegionPi
 
 
 def _share(whole: Slice, parts: Sequence[Slice], number: int) -> Slice:
-    """The share of one of its parts in an interval, up to the middles of the gaps between them."""
+    """Return the share of one of its parts in an interval, up to the middles of the gaps between them."""
     gaps = [(a[2] + b[1]) / 2 for a, b in itertools.pairwise(parts)]
     ends = [whole[1], *gaps, whole[2]]
     return whole[0], ends[number], ends[number + 1]

@@ -1,9 +1,23 @@
-"""The sampled chain in time: hold, delay, converters, discretisation and simulation at 10 ms or any other period."""
+"""The sampled chain in time: hold, delay, converters, discretisation and simulation at 10 ms or any other period.
+
+discretise  a law in s made discrete, and the factors of a law in z
+plant       poles and residues of the modal plant, with analog filters
+pulse       the plant from sample to sample, under a zero-order hold
+sensed      the plant of each signal, and of all together
+scenarios   slew, step, decay, impulse and pulse
+stages      the door of every result on a sampled loop: stages that it does not have are refused
+kernel      compiled steps between the samples, and the linear law
+simulate    the simulator of a case over a scenario
+simulation  the record of a simulated loop, and figures of its signals
+results     a simulated scenario with enough modes, and its limit cycle
+traces      curves over time for pictures, and the motion for a film
+"""
 
 from tfarm.arm.chain import Actuator, Chain, Converters, Sampling, Slew, load_chain
-from tfarm.dsp.plant import PulseTransfer, pulse_transfer
+from tfarm.dsp.pulse import PulseTransfer, pulse_transfer
 from tfarm.dsp.scenarios import Scenario, scenario
-from tfarm.dsp.simulate import Measurement, Simulation, Simulator
+from tfarm.dsp.simulate import Measurement, Simulator
+from tfarm.dsp.simulation import Simulation
 from tfarm.moved import moved, moved_module
 
 __all__ = [

@@ -17,6 +17,7 @@ encoder, where a chain estimates the hub rate, is (1 - a)/T (z - 1)/(z - a) time
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -59,7 +60,7 @@ def discretise_law(law: Law, period: float) -> Law:
 
 
 def rule_in_words(law: Law) -> str:
-    """Discretisation of a law, in words."""
+    """Return the discretisation of a law, in words."""
     if law.is_discrete:
         return "in z, as given"
     names = {"tustin": "Tustin's rule", "zoh": "zero-order hold", "matched": "matched poles and zeros"}
@@ -67,7 +68,7 @@ def rule_in_words(law: Law) -> str:
 
 
 def _in_z(part: Part, law: Law, period: float) -> LawBlock:
-    """A block of the law in z."""
+    """Return a block of the law in z."""
     block = part.block
     rule = law.rule
     remedy = f"the rule {rule} is not for a law that differentiates: add a pole to den, or take tustin"
@@ -98,12 +99,12 @@ def tustin(block: LawBlock, period: float, prewarp: float = 0.0) -> LawBlock:
 
 
 def prewarp_speed(period: float, prewarp: float) -> float:
-    """c [1/s] of s = c (z - 1)/(z + 1)."""
+    """Return c [1/s] of s = c (z - 1)/(z + 1)."""
     return prewarp / math.tan(prewarp * period / 2) if prewarp else 2 / period
 
 
 def by_scipy(block: LawBlock, period: float, rule: Literal["zoh", "bilinear"]) -> StateSpace:
-    """The block in z by a rule of `scipy.signal.cont2discrete`."""
+    """Return the block in z by a rule of `scipy.signal.cont2discrete`."""
     # here, because it takes a while to load
     from scipy.signal import cont2discrete
 
@@ -111,7 +112,7 @@ def by_scipy(block: LawBlock, period: float, rule: Literal["zoh", "bilinear"]) -
 
 
 def by_factors(block: Rational, rule: Literal["tustin", "matched"], period: float, c: float) -> Rational:
-    """The ratio in z of its exact factors; `matched` has at rest the same power of s and of (z - 1)/T."""
+    """Return the ratio in z of its exact factors; `matched` has at rest the same power of s and of (z - 1)/T."""
     poles, ((gain, zeros),) = block_factors(block, rule, period, c)
     return Rational.of_roots(1 + zeros, 1 + poles, gain)
 
@@ -120,7 +121,7 @@ def by_factors(block: Rational, rule: Literal["tustin", "matched"], period: floa
 
 
 def system_matrix(law: Law) -> Real:
-    """[A B; C D] of a law of all its columns, signals first."""
+    """Return [A B; C D] of a law of all its columns, signals first."""
     A, B, C, D = law.matrices((*law.signals, *law.wanted))
     return np.block([[A, B], [C, D]])
 
@@ -154,14 +155,16 @@ def in_single(law: Law) -> Law:
 
     Raises ParameterError for two parts on one signal, whose sum is rounded, and for a number beyond float32.
     """
-    names = [name for part in law.parts for name in part.signals if name]
+    names: list[str] = []
+    for part in law.parts:
+        names += filter(None, part.signals)
     remedy = "in float32 a signal has one part: add them up first"
     require(len(set(names)) == len(names), "converters.arithmetic", "float32", remedy)
     return replace(law, parts=tuple(Part(part.signals, _single_block(part.block)) for part in law.parts))
 
 
 def _single_block(block: LawBlock) -> LawBlock:
-    """A block in the numbers of float32; a constant gain remains one."""
+    """Return a block in the numbers of float32; a constant gain remains one."""
     with np.errstate(over="ignore"):
         matrices = [each.astype(np.float32).astype(float) for each in block.matrices()]
     remedy = (
@@ -175,16 +178,16 @@ def _single_block(block: LawBlock) -> LawBlock:
 
 
 def with_estimate(law: Law, chain: Chain) -> Law:
-    """The law in z, with the filtered difference of the encoder where the chain estimates the hub rate by it."""
+    """Return the law in z, with the filtered difference of the encoder where the chain estimates the hub rate by it."""
     if chain.converters.hub_rate != "difference" or "hub_rate" not in law.signals:
         return law
     T = chain.sampling.period
     a = float(np.exp(-chain.converters.rate_filter * T))
-    return replace(law, parts=tuple(_differenced(part, a, T) for part in law.parts), references=())
+    return replace(law, parts=tuple(_from_angle(part, a, T) for part in law.parts), references=())
 
 
-def _differenced(part: Part, a: float, T: float) -> Part:
-    """A part of a law with its columns of the hub rate replaced by columns of the hub angle.
+def _from_angle(part: Part, a: float, T: float) -> Part:
+    """Return a part of a law with its columns of the hub rate replaced by columns of the hub angle.
 
     x_{k+1} = a x_k + angle,  rate = (1 - a)/T (angle + (a - 1) x_k)
     """
@@ -238,78 +241,87 @@ class LawInZ:
         return [(part, row, gain, np.r_[zeros, others[part]]) for part, row, gain, zeros in self.columns]
 
     def ignores(self, turned: Real, weights: Sequence[float]) -> bool:
-        """Whether its output tends to 0 where its signals stay at these values (signals,)."""
+        """Return whether its output tends to 0 where its signals stay at these values (signals,)."""
         out = []
         for part, (poles, weight) in enumerate(zip(self.part_poles, weights, strict=True)):
             held, below = lowest_power(poles)
-            terms = [
-                (*lowest_power(zeros), weight * g * turned[row])
-                for n, row, g, zeros in self.columns
-                if n == part
-            ]
-            by_order = [
-                [value * factor for n, value, factor in terms if n == order] for order in range(held + 1)
-            ]
+            # by the power of delta that they are multiplied by
+            terms = defaultdict[int, list[float]](list)
+            pushes = []
+            for n, row, g, zeros in self.columns:
+                if n == part:
+                    power, lowest = lowest_power(zeros)
+                    pushes.append(weight * g * turned[row])
+                    terms[power].append(lowest * pushes[-1])
             # an integrator of the only signal, cancelled or not
-            is_reached = held and len(terms) == 1 and terms[0][2]
-            if is_reached or not all(map(_cancel, by_order[:held])):
+            is_reached = held and len(pushes) == 1 and pushes[0]
+            if is_reached or not all(_cancel(terms[power]) for power in range(held)):
                 return False
-            out += [each / below for each in by_order[held]]
+            out += [each / below for each in terms[held]]
         return _cancel(out)
 
 
 def _cancel(terms: Sequence[float]) -> bool:
-    """Whether a sum over several signals is 0, to 1e-12 of its terms."""
+    """Return whether a sum over several signals is 0, to 1e-12 of its terms."""
     return abs(sum(terms)) <= 1e-12 * sum(map(abs, terms))
 
 
 def lowest_power(roots: Complex) -> tuple[int, float]:
-    """n and c of prod(delta - roots) = c delta^n + ..."""
+    """Return n and c of prod(delta - roots) = c delta^n + ..."""
     left = roots[roots != 0]
     return roots.size - left.size, float(np.prod(-left).real)
 
 
 def law_in_z(law: Law, acting: Law, chain: Chain) -> LawInZ:
-    """The parts of a law, and of the same in z (`acting`), at the period of a chain that may estimate the hub rate.
+    """Return the parts of a law, and of the same in z (`acting`), at the period of a chain.
 
-    The factors are those of the law itself; in float32 those of `acting`, whose numbers are rounded.
+    The chain may estimate the hub rate.  The factors are those of the law itself; in float32 those of `acting`, whose
+    numbers are rounded.
     """
     law = acting if chain.converters.is_single else law
     acting = with_estimate(acting, chain)
     alone = [acting.weighted(row).matrices() for row in np.eye(len(acting.parts)).tolist()]
-    (A, B, _, _), C, D = alone[0], *(np.vstack([each[n] for each in alone]) for n in (2, 3))
-    found = [_factors(part, law, chain) for part in law.parts]
-    columns = [
-        (n, acting.signals.index(name), g, zeros) for n, (_, of) in enumerate(found) for name, g, zeros in of
-    ]
-    return LawInZ(acting.signals, tuple(poles for poles, _ in found), tuple(columns), (A, B, C, D))
+    A, B, _, _ = alone[0]
+    C = np.vstack([each[2] for each in alone])
+    D = np.vstack([each[3] for each in alone])
+    poles = []
+    columns: list[PartColumn] = []
+    for n, part in enumerate(law.parts):
+        own, found = _factors(part, law, chain)
+        poles.append(own)
+        columns += [(n, acting.signals.index(name), g, zeros) for name, g, zeros in found]
+    return LawInZ(acting.signals, tuple(poles), tuple(columns), (A, B, C, D))
 
 
 def _factors(part: Part, law: Law, chain: Chain) -> tuple[Complex, list[tuple[str, float, Complex]]]:
-    """The poles of one part in z, and signal, gain and zeros of each column."""
+    """Return the poles of one part in z, and signal, gain and zeros of each column."""
     T = chain.sampling.period
-    poles, found = block_factors(
-        part.block, "none" if law.is_discrete else law.rule, T, prewarp_speed(T, law.prewarp)
-    )
-    columns = [(name, -law.sign * g, zeros) for name, (g, zeros) in zip(part.signals, found, strict=True)]
-    columns = [each for each in columns if is_measured(each[0])]
+    rule = "none" if law.is_discrete else law.rule
+    poles, found = block_factors(part.block, rule, T, prewarp_speed(T, law.prewarp))
+    columns: list[tuple[str, float, Complex]] = []
+    for name, (g, zeros) in zip(part.signals, found, strict=True):
+        if is_measured(name):
+            columns.append((name, -law.sign * g, zeros))
     if chain.converters.hub_rate != "difference" or "hub_rate" not in part.signals:
         return poles, columns
     # -lag/T delta/(delta - lag) times the angle
     lag = float(np.expm1(-chain.converters.rate_filter * T))
-    return np.r_[poles, lag], [
-        ("hub_angle", -g * lag / T, np.r_[zeros, 0.0]) if name == "hub_rate" else (name, g, np.r_[zeros, lag])
-        for name, g, zeros in columns
-    ]
+    through = []
+    for name, g, zeros in columns:
+        if name == "hub_rate":
+            through.append(("hub_angle", -g * lag / T, np.r_[zeros, 0.0]))
+        else:
+            through.append((name, g, np.r_[zeros, lag]))
+    return np.r_[poles, lag], through
 
 
 def root_product(start: Complex, roots: Complex, more: Any = 0.0) -> Complex:
-    """prod(delta - roots) at delta = start + more (n,), without loss where a root is the start."""
+    """Return prod(delta - roots) at delta = start + more (n,), without loss where a root is the start."""
     return ((start[:, None] - roots) + np.reshape(more, (-1, 1))).prod(axis=1)
 
 
 def root_product_error(start: Complex, roots: Complex, more: Any) -> Real:
-    """Bound on the rounding error of that product; a root that is the start is exact."""
+    """Return a bound on the rounding error of that product; a root that is the start is exact."""
     # of each term of F: of its product of n factors they add up as the root of n
     roundings = 8
     away = start[:, None] - roots

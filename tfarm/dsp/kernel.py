@@ -4,6 +4,7 @@ All compiled functions are in this one file, for numba's cache does not notice a
 named tuples: a `SampleModel` of the arm, its `State`, the `Forcing` of a scenario and the `Electronics` of a chain.
 """
 
+from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 from tfarm.arm.chain import Sampling
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real, Whole
-from tfarm.dsp.plant import Plant, held_amplitude
+from tfarm.dsp.plant import Plant
+from tfarm.dsp.pulse import held_amplitude
 from tfarm.exact.compiled import compiled, inlined
 
 CONSUMER = Consumer(
@@ -37,24 +39,19 @@ CONSUMER = Consumer(
     ),
 )
 
-# of the outputs, which begin with what is fed back (`tfarm.arm.FED_BACK`)
-ANGLE = 0
-RATE = 1
+# row of the root moment among the outputs, which begin with `tfarm.arm.FED_BACK`
 MOMENT = 2
 # rows of the quantisers, and places in `saturated`
 ENCODER = 0
 AMPLIFIER = 1
 DAC = 2
-# integrals of the torque in `rigid`, and their weights in an output in `rates`
-DOUBLY = 0
-ONCE = 1
-# of a piece of a sample: its length [s], whether the new torque acts, a record
-# of `work` [J]: done on the hub, and the sum of its absolute values
-DONE = 0
-# of a row of the quantisers
-# memory of the estimate of the hub rate
-# a number above it is true among floats
-YES = 0.5
+
+
+class Integral(IntEnum):
+    """Integrals of the torque in `rigid`, and the columns of their weights in `rates`."""
+
+    DOUBLE = 0
+    SINGLE = 1
 
 
 class SampleModel(NamedTuple):
@@ -78,7 +75,10 @@ class SampleModel(NamedTuple):
 
 
 def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: int) -> SampleModel:
-    """The model of a plant's poles `kept`, with `between` records in each sample; `hub` is the row of the hub angle."""
+    """Return the model of a plant's poles `kept` with `between` records in each sample.
+
+    `hub` is the row of the hub angle.
+    """
     p = plant.poles[kept]
     T = sampling.period
     f = sampling.fraction
@@ -91,7 +91,8 @@ def model_of(plant: Plant, kept: Whole, sampling: Sampling, between: int, hub: i
         push=np.array([held_amplitude(p, float(each)) for each in ends - starts]),
         piece=np.c_[ends - starts, starts >= f * T, np.isin(ends, records)].astype(float),
         weights=np.ascontiguousarray(plant.residues[:, kept] * np.where(p.imag > 0, 2.0, 1.0)),
-        rates=np.array(plant.rigid),  # in one layout: the compiled loop is compiled anew for each
+        # in one layout: the compiled loop is compiled anew for each
+        rates=np.array(plant.rigid),
         static=np.array(plant.static),
         hub=hub,
     )
@@ -144,8 +145,10 @@ class Electronics(NamedTuple):
 
 @inlined
 def dynamic_output(o: int, model: Any, state: Any) -> float:
-    """Output o without its static remainder."""
-    value = model.rates[o, DOUBLY] * state.rigid[DOUBLY] + model.rates[o, ONCE] * state.rigid[ONCE]
+    """Return output o without its static remainder."""
+    double = model.rates[o, Integral.DOUBLE] * state.rigid[Integral.DOUBLE]
+    single = model.rates[o, Integral.SINGLE] * state.rigid[Integral.SINGLE]
+    value = double + single
     for i in range(state.amplitude.size):
         weight = model.weights[o, i]
         amplitude = state.amplitude[i]
@@ -155,7 +158,7 @@ def dynamic_output(o: int, model: Any, state: Any) -> float:
 
 @compiled
 def read_outputs(model: Any, state: Any, torque: float, out: Any) -> None:
-    """The outputs under the torque that acts now."""
+    """Read the outputs under the torque that acts now into `out`."""
     for o in range(out.size):
         out[o] = dynamic_output(o, model, state) + model.static[o] * torque
 
@@ -170,31 +173,33 @@ def advance_state(k: int, model: Any, state: Any, old: float, new: float, push_o
     duration = 0
     is_new = 1
     is_record = 2
+    # of `work` [J]: done on the hub, and the sum of its absolute values
+    net = 0
     moved = 1
     row = 0
     before = dynamic_output(model.hub, model, state)
     for s in range(model.piece.shape[0]):
-        torque = (new if model.piece[s, is_new] > YES else old) + push_on
+        torque = (new if model.piece[s, is_new] != 0.0 else old) + push_on
         dt = model.piece[s, duration]
         for i in range(state.amplitude.size):
             about = state.amplitude[i] + model.rest[i] * torque
             state.circle[i] = max(state.circle[i], about.real * about.real + about.imag * about.imag)
             state.amplitude[i] = model.turn[s, i] * state.amplitude[i] + model.push[s, i] * torque
-        state.rigid[DOUBLY] += dt * state.rigid[ONCE] + 0.5 * dt * dt * torque
-        state.rigid[ONCE] += dt * torque
+        state.rigid[Integral.DOUBLE] += dt * state.rigid[Integral.SINGLE] + 0.5 * dt * dt * torque
+        state.rigid[Integral.SINGLE] += dt * torque
         after = dynamic_output(model.hub, model, state)
         done = torque * (after - before)
-        state.work[DONE] += done
+        state.work[net] += done
         state.work[moved] += abs(done)
         before = after
-        if model.piece[s, is_record] > YES and row < state.fine.shape[1]:
+        if model.piece[s, is_record] != 0.0 and row < state.fine.shape[1]:
             read_outputs(model, state, torque, state.fine[k, row])
             row += 1
 
 
 @compiled
 def quantise(value: float, row: Any, saturated: Any, which: int) -> float:
-    """`value` on the steps of a converter, clipped to its range and then marked in `saturated` (3,)."""
+    """Return a value on the steps of a converter, clipped to its range; mark a clipped one in `saturated` (3,)."""
     # of a row of the quantisers
     step = 0
     lowest = 1
@@ -209,14 +214,14 @@ def quantise(value: float, row: Any, saturated: Any, which: int) -> float:
 def estimate(
     angle: float, rate: float, memory: Any, is_differenced: bool, pole: float, period: float
 ) -> float:
-    """The hub rate of the controller: a reading of its own, or the filtered difference of the encoder."""
+    """Return the hub rate of the controller: a reading of its own, or the filtered difference of the encoder."""
     # memory of the estimate of the hub rate
     angle_before = 0
     rate_before = 1
     begun = 2
     if not is_differenced:
         return rate
-    if memory[begun] < YES:
+    if memory[begun] == 0.0:
         memory[angle_before] = angle
         memory[begun] = 1.0
     step = angle - memory[angle_before]
@@ -226,20 +231,24 @@ def estimate(
 
 
 def convert_outputs(record: Any, saturated: Any, memory: Any, of: Any) -> Any:
-    """Hub angle, hub rate and root moment of one sample's outputs, through the converters of `Electronics`."""
-    angle = quantise(record[ANGLE], of.quantisers[ENCODER], saturated, ENCODER)
+    """Return hub angle, hub rate and root moment of one sample's outputs, through the converters of `Electronics`."""
+    # rows of the outputs
+    angle_row = 0
+    rate_row = 1
+    angle = quantise(record[angle_row], of.quantisers[ENCODER], saturated, ENCODER)
     moment = quantise(record[MOMENT], of.quantisers[AMPLIFIER], saturated, AMPLIFIER)
-    return angle, estimate(angle, record[RATE], memory, of.is_differenced, of.pole, of.period), moment
+    rate = estimate(angle, record[rate_row], memory, of.is_differenced, of.pole, of.period)
+    return angle, rate, moment
 
 
-def before(k: int, model: Any, state: Any, forcing: Any, of: Any) -> bool:
+def read_before(k: int, model: Any, state: Any, forcing: Any, of: Any) -> bool:
     """Read the outputs just before sample k; return whether the root moment is within its bound."""
     torque = state.held[(k - of.delay - 1) % state.held.size] + (forcing.disturbance[k - 1] if k > 0 else 0.0)
     read_outputs(model, state, torque, state.record[k])
     return abs(state.record[k, MOMENT]) <= of.bound
 
 
-def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> None:
+def advance_after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> None:
     """Pass the torque u at sample k through the DAC, where it is held and acts a delay later; advance by one sample."""
     ring = state.held.size
     old = state.held[(k - of.delay - 1) % ring]
@@ -248,25 +257,25 @@ def after(k: int, u: float, model: Any, state: Any, forcing: Any, of: Any) -> No
     if k == 0:
         for i in range(state.amplitude.size):
             state.amplitude[i] += forcing.impulse
-        state.rigid[ONCE] += forcing.impulse
+        state.rigid[Integral.SINGLE] += forcing.impulse
     advance_state(k, model, state, old, state.held[(k - of.delay) % ring], forcing.disturbance[k])
 
 
 # those of Python loops are plain
-_before = inlined(before)
-_converted = inlined(convert_outputs)
-_after = inlined(after)
+_read_before = inlined(read_before)
+_convert_outputs = inlined(convert_outputs)
+_advance_after = inlined(advance_after)
 
 
 @inlined
 def to_precision(value: float, single: bool) -> float:
-    """A number in the precision of the controller: float32 or float64."""
+    """Return a number in the precision of the controller: float32 or float64."""
     return float(np.float32(value)) if single else value
 
 
 @inlined
 def add_row_product(row: Any, values: Any, start: float, single: bool) -> float:
-    """start + row . values, every product and sum in the precision of the controller."""
+    """Return start + row . values, every product and sum in the precision of the controller."""
     total = start
     for j in range(values.size):
         total = to_precision(total + to_precision(row[j] * values[j], single), single)
@@ -275,7 +284,7 @@ def add_row_product(row: Any, values: Any, start: float, single: bool) -> float:
 
 @inlined
 def law_step(table: Any, z: Any, feedforward: float, single: bool, out: Any) -> None:
-    """out = table z of z = [x; e]: the next states, and the output, which begins with the feedforward."""
+    """Set out = table z of z = [x; e]: the next states, and the output, which begins with the feedforward."""
     for i in range(out.size):
         out[i] = add_row_product(table[i], z, feedforward if i == out.size - 1 else 0.0, single)
 
@@ -297,10 +306,10 @@ def run_samples(
     z = np.zeros(table.shape[1])
     following = np.zeros(order + 1)
     for k in range(state.torque.size):
-        if not _before(k, model, state, forcing, electronics):
+        if not _read_before(k, model, state, forcing, electronics):
             return k
         record = state.record[k]
-        known[ANGLE], known[RATE], known[MOMENT] = _converted(record, state.saturated[k], memory, electronics)
+        known[0], known[1], known[MOMENT] = _convert_outputs(record, state.saturated[k], memory, electronics)
         for j in range(sources.size):
             source = sources[j]
             if source < 0:
@@ -315,5 +324,5 @@ def run_samples(
         law_step(table, z, to_precision(forcing.feedforward[k], single), single, following)
         for i in range(order):
             z[i] = following[i]
-        _after(k, following[order], model, state, forcing, electronics)
+        _advance_after(k, following[order], model, state, forcing, electronics)
     return state.torque.size

@@ -21,15 +21,13 @@ from tfarm.case import Case, OfCase
 from tfarm.dsp.discretise import RULE, rule_in_words
 from tfarm.dsp.plant import MODES_USED
 from tfarm.dsp.scenarios import TRIAL_DURATION, Scenario, describe_scenario, scenario
-from tfarm.dsp.simulate import Simulation, Simulator, Trace
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.simulation import Simulation, Trace
 from tfarm.dsp.traces import resolve_simulations
 from tfarm.errors import ConvergenceError
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Column, Quantity, Table
-
-# of each signal's largest value: the digits of a table of a simulation
-ENOUGH_CHANGE = 1e-4
 
 
 class Enough(NamedTuple):
@@ -48,6 +46,11 @@ class Enough(NamedTuple):
             help="largest relative change of a signal when the number of modes was doubled",
         ),
     ]
+
+    @property
+    def is_converged(self) -> bool:
+        """Whether the change is within 1e-4, the digits of a table of a simulation."""
+        return self.change is not None and self.change <= 1e-4
 
 
 def enough_modes(simulate: Callable[[int], Simulation], count: int | None = None) -> Enough:
@@ -70,13 +73,13 @@ def enough_modes(simulate: Callable[[int], Simulation], count: int | None = None
         off = change(before.at_samples, now.at_samples)
         before = now
         found = Enough(count, off)
-        if off <= ENOUGH_CHANGE:
+        if found.is_converged:
             break
     return found
 
 
 def change(before: Trace, after: Trace) -> float:
-    """The largest change of any signal at the samples of both, relative to that signal's largest value."""
+    """Return the largest change of any signal at the samples of both, relative to that signal's largest value."""
     n = min(before.t.size, after.t.size)
     pairs = [(before.signal(name)[:n], after.signal(name)[:n]) for name in after.names]
     return max(
@@ -299,7 +302,8 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
         return None
     last = slice(n - n // 4, n)
     before = slice(n - n // 2, n - n // 4)
-    moment = simulation.at_samples.root_moment
+    at_samples = simulation.at_samples
+    moment = at_samples.root_moment
     size = _half_range(moment[last])
     earlier = _half_range(moment[before])
     about = moment[last] - moment[last].mean()
@@ -308,22 +312,23 @@ def limit_cycle(simulation: Simulation, ideal: Simulation) -> LimitCycle | None:
     # fewer turns of the moment about its mean are a drift and no vibration
     is_transient = is_clipped and (earlier < cycle_lasts * size or turns < 1)
     # in a quarter of the record: a smaller change may be one of sampled peaks
-    is_unstable = ideal.stopped is not None or _left(ideal, last) > 1.02 * _left(ideal, before)
+    of_ideal = _moment_range(ideal, last)
+    is_unstable = ideal.stopped is not None or of_ideal > 1.02 * _moment_range(ideal, before)
     # twice the vibration of an ideal chain at that time
-    is_own = (is_clipped and is_unstable) or size > 2 * _left(ideal, last)
+    is_own = (is_clipped and is_unstable) or size > 2 * of_ideal
     if size == 0.0 or size < cycle_lasts * earlier or is_transient or not is_own:
         return None
     return LimitCycle(
         root_moment=size,
-        hub_rate=_half_range(simulation.at_samples.hub_rate[last]),
+        hub_rate=_half_range(at_samples.hub_rate[last]),
         torque=_half_range(simulation.torque[last]),
         frequency=float(2 * np.pi * turns / ((about.size - 1) * simulation.scenario.period)),
         kept_up_by="saturation" if is_clipped else "quantisation",
     )
 
 
-def _left(ideal: Simulation, part: slice) -> float:
-    """Half of the range of the moment of the ideal chain in a part of the record; inf where that was stopped."""
+def _moment_range(ideal: Simulation, part: slice) -> float:
+    """Return half the range of the moment of the ideal chain in a part of the record; inf where that was stopped."""
     if ideal.stopped:
         return math.inf
     return _half_range(ideal.at_samples.root_moment[part])
@@ -334,7 +339,7 @@ def _half_range(signal: Real) -> float:
 
 
 def ideal_chain(chain: Chain) -> Chain:
-    """The chain with the same sampling and filters, and ideal converters: no steps, no ranges, no limit, float64."""
+    """Return the chain with the same sampling and filters, and ideal converters: no steps, ranges or limit, float64."""
     of = chain.converters
     converters = Converters(hub_rate=of.hub_rate, rate_filter=of.rate_filter)
     return replace(chain, converters=converters, actuator=replace(chain.actuator, torque_limit=math.inf))

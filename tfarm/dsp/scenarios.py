@@ -23,7 +23,6 @@ TRIAL_COST = (1.0, 2.6)
 TRIAL_SLEWS = 3.0
 # s, of a trial or a simulation by default: three times the paper's slew
 TRIAL_DURATION = 3.0
-SCENARIOS = ("slew", "step", "decay", "impulse", "pulse")
 
 
 @frozen
@@ -64,7 +63,7 @@ class Scenario:
         return self.rigid_moment * float(self.reading == "vibration")
 
     def residual(self, moment: Real) -> Real:
-        """The root moment (samples, ...) less the rigid arm's [N m], at the samples from the end of the slew on."""
+        """Return the root moment (samples, ...) less the rigid arm's [N m], at samples from the end of the slew on."""
         return (moment.T - self.rigid_moment).T[self.is_after]
 
     @property
@@ -73,7 +72,7 @@ class Scenario:
         return self.t >= self.busy_until * (1 - TIME_ROUNDING)
 
     def residual_rms(self, moment: Real) -> float | None:
-        """Root mean square of the residual of a root moment (n,) [N m]; None of a record that ends before."""
+        """Return the rms of the residual of a root moment (n,) [N m]; None of a record that ends before."""
         left = self.residual(moment) if moment.size == self.t.size else np.empty(0)
         return float(np.sqrt(np.mean(left**2))) if left.size else None
 
@@ -107,7 +106,7 @@ def slew_scenario(arm: Arm, chain: Chain, duration: float) -> Scenario:
 
 
 def torque_unit(arm: Arm, chain: Chain) -> float:
-    """The slew's torque J theta_dd over that of the paper's arm [N m], to one digit: 1 there.
+    """Return the slew's torque J theta_dd over that of the paper's arm [N m], to one digit: 1 there.
 
     For an arm without a slew J is its own inertia about the hub, without the held parts.
     """
@@ -116,7 +115,7 @@ def torque_unit(arm: Arm, chain: Chain) -> float:
 
 
 def trial_weights(arm: Arm, chain: Chain) -> tuple[float, float]:
-    """The weights a and b [1/(N m)^2 s] of the cost of a trial: `TRIAL_COST` in the arm's own unit of torque."""
+    """Return the weights a and b [1/(N m)^2 s] of the cost of a trial: `TRIAL_COST` in the arm's own unit of torque."""
     a, b = np.array(TRIAL_COST) / torque_unit(arm, chain) ** 2
     return float(a), float(b)
 
@@ -149,7 +148,7 @@ def rest_scenario(name: str, arm: Arm, chain: Chain, duration: float, signal: st
 
 
 def describe_scenario(task: Scenario, arm: Arm, chain: Chain) -> str:
-    """A scenario with its size, in words."""
+    """Return a scenario with its size, in words."""
     return {
         "slew": f"a slew: the tip moves {chain.slew.travel_of(arm.reach):.4g} m in {chain.slew.rise_time:g} s",
         "step": f"a step of {task.feedforward[0]:.4g} {arm.input_unit}",
@@ -162,21 +161,18 @@ def describe_scenario(task: Scenario, arm: Arm, chain: Chain) -> str:
 
 def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
     """Return the scenario of that name with its usual size.  Raises ParameterError for an unknown one."""
-    must_be_known("scenario", name, SCENARIOS)
+    must_be_known("scenario", name, ("slew", "step", "decay", "impulse", "pulse"))
     if name == "slew":
         return slew_scenario(arm, chain, duration)
     return rest_scenario(name, arm, chain, duration)
 
 
 def _samples(duration: float, period: float) -> int:
-    """Number of samples in 0 .. duration, both ends included."""
+    """Return the number of samples in 0 .. duration, both ends included."""
     # of a record, a few hundred MB of signals
     most_task_samples = 4_000_000
     length = positive("duration", duration, "a duration is a positive, finite number of seconds")
-    require(
-        length / period < most_task_samples,
-        "duration",
-        length,
-        f"at most {most_task_samples} samples of {period:g} s; a shorter one, or a longer period",
-    )
-    return math.floor(length / period * (1 + TIME_ROUNDING)) + 1
+    periods = length / period
+    remedy = f"at most {most_task_samples} samples of {period:g} s; a shorter one, or a longer period"
+    require(periods < most_task_samples, "duration", length, remedy)
+    return math.floor(periods * (1 + TIME_ROUNDING)) + 1

@@ -11,42 +11,32 @@ A signal is rounded to the nearest step (mid-tread) and clipped to the codes of 
 import math
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, NamedTuple, Self, cast
+from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tfarm.arm import ANGLE_GAIN, AT_HUB, RATE_GAIN, HubFeedback
-from tfarm.arm.chain import TIME_ROUNDING, Chain
+from tfarm.arm import ANGLE_GAIN, AT_HUB, RATE_GAIN, Arm, HubFeedback
+from tfarm.arm.chain import Chain
 from tfarm.arm.checks import whole
 from tfarm.arm.law import REFERENCE, Law
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.case import Case
 from tfarm.dsp import kernel
 from tfarm.dsp.discretise import acting_law, system_matrix
-from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, sensed_plant, with_held_filter
+from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, with_held_filter
 from tfarm.dsp.scenarios import Scenario
+from tfarm.dsp.sensed import sensed_plant
+from tfarm.dsp.simulation import Simulation, Stop, Trace
 from tfarm.dsp.stages import admit
 from tfarm.errors import must_be_known, require
-from tfarm.exact.outputs import OUTPUTS
-from tfarm.records import frozen
-from tfarm.schema import Quantity
 
-# rad: the simulation stops at the root moment EI/L times this, far beyond small deflections
-FOLDED_UP = 10.0
 # records between two samples
 MOST_BETWEEN = 1000
-RESIDUAL = "residual root moment after the slew"
-# of the travel, within which a signal has settled: as in python-control and MATLAB
-SETTLING_BAND = 0.02
-# a tenth of a record has to follow a settling time
-LEFT_OF_RECORD = 10
 
 
 def quantisers(chain: Chain) -> Real:
-    """Step, lowest and highest value (3, 3) of a chain's encoder, strain amplifier and DAC, as `kernel` numbers them.
+    """Return step, lowest and highest value (3, 3) of a chain's encoder, strain amplifier and DAC, in `kernel`'s rows.
 
     A step of 0 is ideal; the torque's range also respects the motor's limit.
     """
@@ -57,26 +47,6 @@ def quantisers(chain: Chain) -> Real:
     return np.array(
         [encoder, _converter(of.moment_bits, of.moment_range), [step, max(low, -limit), min(high, limit)]]
     )
-
-
-def final_value(t: Real, y: Real) -> float:
-    """Mean of a signal (n,) over the last tenth of its record."""
-    return float(y[LEFT_OF_RECORD * t >= (LEFT_OF_RECORD - 1) * t[-1]].mean())
-
-
-def settling_time(
-    t: Real, away: Real, scale: float = 0.0, moves_until: float = 0.0, band: float = SETTLING_BAND
-) -> float | None:
-    """Time [s] from the end of the motion after which deviations (n,) from the final value stay within a band.
-
-    The band is a share of a scale, of the largest deviation where that is 0.  None where the deviation leaves it in the
-    last tenth of the record.
-    """
-    scale = scale or float(away.max(initial=0.0))
-    first = 1 + int(np.flatnonzero(away > band * scale).max(initial=-1))
-    if first > 0 and (first >= t.size or LEFT_OF_RECORD * (t[-1] - t[first]) < t[-1] * (1 - TIME_ROUNDING)):
-        return None
-    return max(0.0, float(t[first]) - moves_until)
 
 
 def _converter(bits: int | None, span: float | None) -> list[float]:
@@ -103,177 +73,13 @@ class Measurement(NamedTuple):
     rigid_moment: float
 
     def servo(self, law: HubFeedback) -> float:
-        """Input [N m] of a law by the errors of the hub's angle and rate."""
+        """Return the input [N m] of a law by the errors of the hub's angle and rate."""
         angle_off = self.angle_reference - self.hub_angle
         rate_off = self.rate_reference - self.hub_rate
         return law[ANGLE_GAIN] * angle_off + law[RATE_GAIN] * rate_off
 
 
 ControlFunction = Callable[[Measurement], float]
-
-
-@frozen
-class Trace:
-    """Signals, not filtered, at `t` [s]: hub angle [rad], hub rate [rad/s], root moment [N m], tip displacement [m].
-
-    `others` are further outputs, by name and in SI units.
-    """
-
-    t: Real
-    hub_angle: Real
-    hub_rate: Real
-    root_moment: Real
-    tip_displacement: Real
-    others: dict[str, Real] = field(default_factory=dict)
-
-    def signal(self, name: str) -> Real:
-        """Return a signal by its name.  Raises ParameterError for one that was not recorded."""
-        must_be_known("output", name, self.names)
-        if name in self.others:
-            return self.others[name]
-        return cast("Real", getattr(self, name))
-
-    @property
-    def by_name(self) -> dict[str, Real]:
-        """Time and signals by name."""
-        return {"t": self.t} | {name: self.signal(name) for name in self.names}
-
-    @property
-    def units(
-        self,
-    ) -> Annotated[dict[str, str], Quantity(key="outputs", help="SI unit of each further output")]:
-        """The SI units of the further outputs."""
-        return {name: OUTPUTS[name.partition("@")[0]].unit for name in self.others}
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The names of all signals."""
-        return (*RECORDED, *self.others)
-
-
-@dataclass(frozen=True)
-class Stop:
-    """Early end of a simulation: at `time` [s] the root moment passed its bound, mostly by `mode` (0: the hub)."""
-
-    time: float
-    mode: int
-
-
-@frozen
-class Simulation:
-    """A simulated loop: `at_samples` just before each update, `between` the records between the samples, if any.
-
-    `torque` [N m] is the output of the DAC at each sample, `gain` that on the root moment there (None of a controller
-    without one), `measured` (n, 3) hub angle, hub rate and root moment behind the analog filters.  `saturated_at`
-    (n, 3): whether the encoder, the strain amplifier and the torque were clipped at each sample.  `rings` are frequency
-    (m,) [rad/s] and largest amplitude in `RECORDED` (4, m) of the modes that ring, with Im p > -Re p.
-    `energy_error` is |energy gained - work done| over initial energy and total work, for an arm without damping; None
-    with damping.  Moments of the figures are those before the anti-alias filter.
-    """
-
-    scenario: Annotated[Scenario, Quantity(flat=True, help="scenario of the run")]
-    chain: Chain
-    at_samples: Annotated[Trace, Quantity(flat=True, help="signals at the samples")]
-    between: Trace | None
-    measured: Real
-    torque: Real
-    gain: Real | None
-    saturated_at: NDArray[np.bool_]
-    rings: tuple[Real, Real]
-    energy_error: Annotated[
-        float | None,
-        Quantity(help="energy gained less work done, over initial energy and work, without damping"),
-    ]
-    stopped: Stop | None
-
-    @property
-    def residual_moment(
-        self,
-    ) -> Annotated[
-        float | None,
-        Quantity(
-            f"{RESIDUAL} less the rigid arm's",
-            "N m rms",
-            key="residual_moment_rms",
-            help="rms of the vibration from the end of the slew to the end of the record",
-        ),
-    ]:
-        """The residual; None where the run stopped, or its record ends before the slew."""
-        return self.scenario.residual_rms(self.at_samples.root_moment)
-
-    @property
-    def residual_raw(
-        self,
-    ) -> Annotated[
-        float | None,
-        Quantity(
-            RESIDUAL,
-            "N m rms",
-            key="residual_raw_moment_rms",
-            help="rms of the root moment from the end of the slew to the end of the record",
-        ),
-    ]:
-        """The same of the root moment itself; its first sample is one of the slew's last torque."""
-        rigid = replace(self.scenario, rigid_moment=0 * self.scenario.rigid_moment)
-        return rigid.residual_rms(self.at_samples.root_moment)
-
-    @property
-    def settling_time(
-        self,
-    ) -> Annotated[
-        float | None,
-        Quantity(
-            "settling time (2 %)",
-            "s",
-            4,
-            help="time from the end of the motion after which the root moment stays within 2 % of its largest "
-            "deviation from its final value",
-        ),
-    ]:
-        """None where the simulation stopped, or less than a tenth of the record is left to show it."""
-        moment = self.at_samples.root_moment
-        if self.stopped or not moment.size:
-            return None
-        return settling_time(
-            self.t, abs(moment - final_value(self.t, moment)), moves_until=self.scenario.busy_until
-        )
-
-    @property
-    def saturated(
-        self,
-    ) -> Annotated[
-        dict[str, int],
-        Quantity(
-            "saturated samples",
-            key="saturated_samples",
-            help="samples at which encoder, strain amplifier and torque were clipped",
-        ),
-    ]:
-        """Numbers of samples at which encoder, strain amplifier and torque were clipped."""
-        return dict(zip(("encoder", "moment", "torque"), self.saturated_at.sum(axis=0).tolist(), strict=True))
-
-    @property
-    def finding(self) -> str:
-        """End of the run, largest root moment, and clipped signals."""
-        end = float(self.t.max(initial=0.0))
-        moment = float(abs(self.at_samples.root_moment).max(initial=0.0))
-        clipped = [f"{name} clipped at {n} samples" for name, n in self.saturated.items() if n]
-        if self.stopped is None:
-            ran = f"ran to {end:.6g} s"
-        else:
-            ran = f"unstable, stopped at {self.stopped.time:.6g} s"
-        return ", ".join([ran, f"root moment up to {moment:.4g} N m", *clipped])
-
-    @property
-    def t(self) -> Real:
-        """The times of the samples [s]."""
-        return self.at_samples.t
-
-    @property
-    def volts(self) -> Real | None:
-        """The motor's voltage, where the actuator has a motor constant."""
-        constant = self.chain.actuator.motor_constant
-        return None if constant is None else self.torque / constant
 
 
 class Simulator:
@@ -309,10 +115,11 @@ class Simulator:
         self.others = tuple(dict.fromkeys(name for name in outputs if name not in RECORDED))
         self.measured = tuple(dict.fromkeys((*AT_HUB, *self.law.signals)))
         sensed = sensed_plant(arm, chain, self.measured, count)
-        self.plant = sensed.together
+        plant = sensed.together
         for names in filter(None, (RECORDED, self.others)):
-            self.plant = self.plant.joined(sensed_plant(arm, chain, names, count).unfiltered)
-        self._first: Complex = np.zeros(self.plant.poles.size, complex)
+            plant = plant.join(sensed_plant(arm, chain, names, count).unfiltered)
+        self.plant = plant
+        self._first: Complex = np.zeros(plant.poles.size, complex)
         if scenario.tip_offset:
             self._release(sensed.unfiltered, scenario.tip_offset)
         self.kept = np.nonzero(self.plant.poles.imag >= 0)[0]
@@ -326,12 +133,12 @@ class Simulator:
             period=float(sampling.period),
             delay=sampling.whole_delay,
             is_single=c.is_single,
-            bound=float(FOLDED_UP * arm.bending_scale),
+            bound=largest_moment(arm),
         )
 
     def run(self) -> Simulation:
         """Simulate the law over the scenario, from its start."""
-        return self._driven(self.law, self.gains)
+        return self._run_law(self.law, self.gains)
 
     def linear(self, gains: HubFeedback) -> Simulation:
         """Simulate u = r + gains . (wanted - measured) instead of the simulator's own law.
@@ -339,10 +146,10 @@ class Simulator:
         Raises ParameterError for I_h = 0 with moment feedback.
         """
         law, _ = acting_law(self.case.under(gains))
-        return self._driven(law, gains)
+        return self._run_law(law, gains)
 
-    def _driven(self, law: Law, gains: HubFeedback | None) -> Simulation:
-        """A law in z over the scenario, and its gains at the hub, if it is of these."""
+    def _run_law(self, law: Law, gains: HubFeedback | None) -> Simulation:
+        """Simulate a law in z over the scenario; `gains` are its gains at the hub, if it is of these."""
         columns = (*law.signals, *law.wanted)
         kind = np.float32 if self.electronics.is_single else float
         table = system_matrix(law).astype(kind).astype(float)
@@ -356,7 +163,7 @@ class Simulator:
 
     def controller(self, controller: ControlFunction) -> Simulation:
         """Simulate a callable from a `Measurement` to a torque [N m]; its numbers are float32 if the arithmetic is."""
-        return self._stepped(lambda m: (float(controller(m)), 0.0), None)
+        return self._run_rule(lambda m: (float(controller(m)), 0.0), None)
 
     def gain_schedule(self, K1: float, gain: Callable[[Measurement], float], Kp: float = 0.0) -> Simulation:
         """Simulate the law of `linear` with K2 = gain(measurement) at each sample, recorded as `gain`."""
@@ -366,10 +173,10 @@ class Simulator:
             K = float(gain(m))
             return m.feedforward + m.servo(law) - K * m.vibration, K
 
-        return self._stepped(torque, np.zeros(self.scenario.feedforward.size))
+        return self._run_rule(torque, np.zeros(self.scenario.feedforward.size))
 
     def finer(self, between: int) -> Self:
-        """The same with `between` records in each sample."""
+        """Return the same with `between` records in each sample."""
         other = copy(self)
         other.between = between
         vars(other).pop("model", None)
@@ -383,8 +190,8 @@ class Simulator:
         row = self.plant.outputs.index("hub_angle", len(self.measured))
         return kernel.model_of(self.plant, self.kept, self.chain.sampling, self.between, row)
 
-    def _stepped(self, rule: Callable[[Measurement], tuple[float, float]], gain: Real | None) -> Simulation:
-        """The loop of `kernel.run_samples` in Python."""
+    def _run_rule(self, rule: Callable[[Measurement], tuple[float, float]], gain: Real | None) -> Simulation:
+        """Simulate a rule from a measurement to a torque and a gain: the loop of `kernel.run_samples` in Python."""
         model = self.model
         state = self._start()
         memory = np.zeros(3)
@@ -397,13 +204,13 @@ class Simulator:
             return float(np.float32(value)) if of.is_single else float(value)
 
         for k in range(state.torque.size):
-            if not kernel.before(k, model, state, forcing, of):
+            if not kernel.read_before(k, model, state, forcing, of):
                 return self._result(state, k, gain)
             angle, rate, moment = kernel.convert_outputs(state.record[k], state.saturated[k], memory, of)
             values = angle, rate, moment, moment - references[k][-1], *references[k]
             u, K = rule(Measurement(k, k * task.period, *map(number, values)))
             require(math.isfinite(u), "controller", u, f"its torque at sample {k} is not finite")
-            kernel.after(k, number(u), model, state, forcing, of)
+            kernel.advance_after(k, number(u), model, state, forcing, of)
             if gain is not None:
                 gain[k] = K
         return self._result(state, state.torque.size, gain)
@@ -428,50 +235,51 @@ class Simulator:
 
         `unfiltered` are the measured signals ahead of the filters.
         """
-        first, amplitude = first_mode(self.plant, offset)
+        plant = self.plant
+        first, amplitude = first_mode(plant, offset)
         n = len(self.measured)
-        held = np.zeros(len(self.plant.outputs))
+        held = np.zeros(len(plant.outputs))
         self._first[first] = amplitude
-        held[:n] = 2 * ((unfiltered.residues[:, first] - self.plant.residues[:n, first]) * amplitude).real
+        held[:n] = 2 * ((unfiltered.residues[:, first] - plant.residues[:n, first]) * amplitude).real
         if held.any():
-            self.plant, self._first = with_held_filter(self.plant, held), np.r_[self._first, 1.0]
+            self.plant = with_held_filter(plant, held)
+            self._first = np.r_[self._first, 1.0]
 
     def _energy(self, amplitude: Complex, rate: float) -> float:
-        """Energy of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the residue of the hub rate, and rigid."""
+        """Return the energy of an undamped arm [J]: b^2 |a|^2/2 a mode, b^2 twice the hub rate's residue, and rigid."""
         row = self.plant.outputs.index("hub_rate", len(self.measured))
         rigid = self.plant.rigid[row, 1] * rate**2 / 2
         return float(self.plant.residues[row, self.kept].real @ abs(amplitude) ** 2 + rigid)
 
     def _result(self, state: kernel.State, done: int, gain: Real | None) -> Simulation:
-        """The record of `done` samples."""
+        """Return the record of `done` samples."""
         stopped = None
         error = None
+        plant = self.plant
+        task = self.scenario
+        kept = self.kept
+        T = task.period
         if done < state.torque.size:
-            of_root = np.nan_to_num(
-                abs(self.plant.residues[kernel.MOMENT, self.kept] * state.amplitude), nan=np.inf
-            )
-            stopped = Stop(
-                done * self.scenario.period, int(self.plant.mode[self.kept][int(np.argmax(of_root))])
-            )
-        elif self.plant.arm.is_undamped and not self.chain.actuator.hub_damping > 0:
-            before = self._energy(self._first[self.kept] + self.scenario.impulse, self.scenario.impulse)
-            after = self._energy(state.amplitude, state.rigid[kernel.ONCE])
+            shares = abs(plant.residues[kernel.MOMENT, kept] * state.amplitude)
+            largest = int(np.argmax(np.nan_to_num(shares, nan=np.inf)))
+            stopped = Stop(done * T, int(plant.mode[kept][largest]))
+        elif plant.arm.is_undamped and not self.chain.actuator.hub_damping > 0:
+            before = self._energy(self._first[kept] + task.impulse, task.impulse)
+            after = self._energy(state.amplitude, state.rigid[kernel.Integral.SINGLE])
             work, moved = state.work
             error = float(abs(after - before - work) / max(before + moved, LEAST_SIZE))
-        p = self.plant.poles[self.kept]
-        weights = self.model.weights[len(self.measured) :][: len(RECORDED)]
+        p = plant.poles[kept]
         is_ringing = p.imag > -p.real
-        size = abs(weights[:, is_ringing]) * np.sqrt(state.circle[is_ringing])
-        T = self.scenario.period
-        m = self.between
+        weights = self.model.weights[len(self.measured) :][: len(RECORDED), is_ringing]
+        size = abs(weights) * np.sqrt(state.circle[is_ringing])
         between = None
-        if m:
+        if m := self.between:
             at = T * (np.arange(done)[:, None] + (np.arange(m) + 1) / (m + 1))
             between = self._trace(at.ravel(), state.fine[:done].reshape(done * m, -1))
         return Simulation(
-            scenario=self.scenario,
+            scenario=task,
             chain=self.chain,
-            at_samples=self._trace(self.scenario.t[:done], state.record[:done]),
+            at_samples=self._trace(task.t[:done], state.record[:done]),
             between=between,
             measured=state.record[:done, : len(AT_HUB)],
             torque=state.torque[:done],
@@ -483,9 +291,14 @@ class Simulator:
         )
 
     def _trace(self, t: Real, record: Real) -> Trace:
-        """The recorded outputs."""
+        """Return the recorded outputs."""
         angle, rate, moment, tip, *more = np.ascontiguousarray(record[:, len(self.measured) :].T)
         return Trace(t, angle, rate, moment, tip, dict(zip(self.others, more, strict=True)))
+
+
+def largest_moment(arm: Arm) -> float:
+    """Return the root moment [N m] at which a simulation stops: EI/L by 10 rad, far beyond small deflections."""
+    return float(10.0 * arm.bending_scale)
 
 
 def first_mode(plant: Plant, offset: float, scenario: str = "decay") -> tuple[int, complex]:

@@ -18,11 +18,12 @@ import numpy as np
 
 from tfarm.arm import Arm, HubFeedback
 from tfarm.arm.chain import TIME_ROUNDING
-from tfarm.arrays import Complex, Real
+from tfarm.arrays import Complex, Real, Whole
 from tfarm.case import Case
 from tfarm.dsp.plant import RECORDED
 from tfarm.dsp.scenarios import Scenario
-from tfarm.dsp.simulate import Simulation, Simulator
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.simulation import Simulation
 from tfarm.errors import require
 from tfarm.records import frozen
 from tfarm.schema import Column
@@ -32,22 +33,14 @@ from tfarm.spectrum import modes
 POINTS_A_PERIOD = 20
 # of the height of a curve: a pixel of a picture
 VISIBLE = 1 / 300
-# records between two samples at least
-LEAST_BETWEEN = 3
 # points of a line: at 20 a period still three pixels a period
 MOST_LINE = 6000
-# of the fastest mode that each piece of a band holds at least
-PERIODS = 2
-# times the slew: length of a record
-RECORD_LENGTH = 3.0
 # frames a second
 RATE = 20
-# of a film
-MOST_FRAMES = 240
 
 
 def records_between(arm: Arm, run: Simulation) -> int:
-    """Number of records between two samples that resolve every visible mode in the drawn curves."""
+    """Return the number of records between two samples that resolve every visible mode in the drawn curves."""
     if run.t.size < 2:
         return 0
     frequency, size = run.rings
@@ -67,14 +60,14 @@ class TimeCurve:
     is_band: bool
 
     def at(self, t: Real) -> TimeCurve:
-        """The same at other times, at or after its own, for a file with one column of time."""
+        """Return the same at other times, at or after its own, for a file with one column of time."""
         if self.t.size == t.size:
             return self
         k = np.clip(np.searchsorted(self.t, t * (1 + TIME_ROUNDING), side="right") - 1, 0, self.t.size - 1)
         return TimeCurve(t, self.low[k], self.high[k], self.is_band)
 
     def columns(self, key: str, unit: str) -> Sequence[Column]:
-        """The drawn curve, for its file: one column, or both edges of the band."""
+        """Return the drawn curve, for its file: one column, or both edges of the band."""
         name = f"{key}_{unit.replace(' ', '_')}"
         if not self.is_band:
             return (Column(name, of=self.low),)
@@ -86,14 +79,15 @@ def resolve_simulations(
 ) -> list[Simulation]:
     """Return the simulations of one picture, with enough records between their samples for its fastest visible mode."""
     needed = max(records_between(arm, run(simulator)) for run in runs)
-    # some 30 MB of records
-    most = max(LEAST_BETWEEN, 400_000 // simulator.scenario.t.size)
-    finer = simulator.finer(min(max(LEAST_BETWEEN, needed), most))
+    # records between two samples; the most of a long scenario are some 30 MB
+    least = 3
+    most = max(least, 400_000 // simulator.scenario.t.size)
+    finer = simulator.finer(min(max(least, needed), most))
     return [run(finer) for run in runs]
 
 
 def points_a_period(arm: Arm, run: Simulation) -> tuple[float, int]:
-    """Points of the records in a period of the fastest visible mode (inf without one), and number needed for 20.
+    """Return the points in a period of the fastest visible mode (inf without one), and the number needed for 20.
 
     That number is of records between two samples.
     """
@@ -103,44 +97,49 @@ def points_a_period(arm: Arm, run: Simulation) -> tuple[float, int]:
 
 
 def away(arm: Arm, simulation: Simulation) -> Real:
-    """Tip displacement less that of a rigid arm on its reference [m], at the samples."""
+    """Return the tip displacement less that of a rigid arm on its reference [m], at the samples."""
     reference = arm.reach * simulation.scenario.hub_angle[: simulation.t.size]
     return simulation.at_samples.tip_displacement - reference
 
 
 def curve_of(simulation: Simulation, signal: str) -> TimeCurve:
-    """A signal over time, "root_moment" [N m] or "tip_displacement" [m]."""
+    """Return a signal over time, "root_moment" [N m] or "tip_displacement" [m]."""
     return curve(*continuous(simulation, signal))
 
 
 def tip_deviation(arm: Arm, simulation: Simulation) -> TimeCurve:
-    """Tip displacement less that of a rigid arm on its reference [m]."""
+    """Return the tip displacement less that of a rigid arm on its reference [m]."""
     t, displacement = continuous(simulation, "tip_displacement")
     return curve(t, displacement - arm.reach * reference_angle(simulation.scenario, t))
 
 
 def reference_angle(task: Scenario, t: Real) -> Real:
-    """The reference angle [rad] between its samples, where its rate is linear in time."""
+    """Return the reference angle [rad] between its samples, where its rate is linear in time."""
     T = task.period
-    n = task.hub_angle.size
-    k = np.minimum(np.floor(t / T * (1 + TIME_ROUNDING)).astype(np.int64), n - 1)
-    slope = np.diff(np.r_[task.hub_rate, task.hub_rate[-1:]]) / T
+    rate = task.hub_rate
+    k = sample_of(t, T, rate.size)
+    slope = np.diff(np.r_[rate, rate[-1:]]) / T
     tau = t - k * T
-    return task.hub_angle[k] + tau * (task.hub_rate[k] + slope[k] * tau / 2)
+    return task.hub_angle[k] + tau * (rate[k] + slope[k] * tau / 2)
+
+
+def sample_of(t: Real, period: float, count: int) -> Whole:
+    """Return the sample at or before each time t [s], of `count` samples."""
+    return np.minimum(np.floor(t / period * (1 + TIME_ROUNDING)).astype(np.int64), count - 1)
 
 
 def curve(t: Real, y: Real) -> TimeCurve:
-    """A line where it is short enough for a page, else a band."""
+    """Return a line where it is short enough for a page, else a band."""
     if t.size <= MOST_LINE:
         return TimeCurve(t, y, y, False)
-    # at most 1500 pieces
-    step = max(PERIODS * POINTS_A_PERIOD, math.ceil(t.size / 1500))
+    # at most 1500 pieces, each of at least two periods of the fastest mode
+    step = max(2 * POINTS_A_PERIOD, math.ceil(t.size / 1500))
     starts = np.arange(0, t.size, step)
     return TimeCurve(t[starts], np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts), True)
 
 
 def continuous(simulation: Simulation, signal: str) -> tuple[Real, Real]:
-    """A signal at the samples and between them, in order of time."""
+    """Return a signal at the samples and between them, in order of time."""
     at = simulation.at_samples
     between = simulation.between
     if between is None:
@@ -152,9 +151,8 @@ def continuous(simulation: Simulation, signal: str) -> tuple[Real, Real]:
 
 
 def held_at(simulation: Simulation, values: Real, t: Real) -> Real:
-    """Values held from sample to sample, at the times t [s]."""
-    k = np.floor(t / simulation.scenario.period * (1 + TIME_ROUNDING)).astype(np.int64)
-    return values[np.minimum(k, values.size - 1)]
+    """Return values held from sample to sample, at the times t [s]."""
+    return values[sample_of(t, simulation.scenario.period, values.size)]
 
 
 # ------------------------------------------------------------ the motion from above, at the frames of a film
@@ -177,13 +175,16 @@ class Motion(NamedTuple):
     still: int
 
     def words(self, frame: int) -> str:
-        """Time and input."""
+        """Return the time and input."""
         u = held_at(self.run, self.run.torque, self.t[frame])
         return f"t = {self.t[frame]:.2f} s,  u = {u:.3g} {self.arm.input_unit}"
 
 
-def motion_of(arm: Arm, run: Simulation, until: float = math.inf, most: int = MOST_FRAMES) -> Motion:
-    """Return the motion of a run up to a time [s]: its torques are applied to the arm again, with more outputs."""
+def motion_of(arm: Arm, run: Simulation, until: float = math.inf, most: int = 240) -> Motion:
+    """Return the motion of a run up to a time [s]: its torques are applied to the arm again, with more outputs.
+
+    At most about `most` frames.
+    """
     require(run.t.size > 1, "run", run.t.size, "give a simulation with more than one sample")
     end = min(until, float(run.t[-1]))
     # stations along the link
@@ -199,10 +200,11 @@ def motion_of(arm: Arm, run: Simulation, until: float = math.inf, most: int = MO
     t = np.arange(1 + round(RATE * slower * end)) / (RATE * slower)
     angle, *each = (np.interp(t, *continuous(found, name)) for name in ("hub_angle", *names))
     deflection = np.stack(each, axis=-1)
+    radius = arm.hub.radius
     factor = exaggeration(float(abs(deflection).max()) / arm.reach)
-    link = np.exp(1j * angle)[:, None] * (arm.hub.radius + x + 1j * factor * deflection)
+    link = np.exp(1j * angle)[:, None] * (radius + x + 1j * factor * deflection)
     wanted = np.exp(1j * reference_angle(run.scenario, t))
-    reference = np.outer(wanted, [arm.hub.radius, 1.07 * arm.reach])
+    reference = np.outer(wanted, [radius, 1.07 * arm.reach])
     return Motion(arm, run, t, link, reference, factor, 1 / slower, int(np.argmax(abs(deflection[:, -1]))))
 
 

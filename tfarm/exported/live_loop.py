@@ -28,10 +28,12 @@ from tfarm.assessment.stability_map import BEYOND_PICTURE, sampled_region
 from tfarm.case import Case
 from tfarm.crossing import pieces
 from tfarm.digits import kept_digits
-from tfarm.dsp import Chain, PulseTransfer, Simulator, scenario, traces
-from tfarm.dsp.plant import Plant, sensed_plant
+from tfarm.dsp import Chain, PulseTransfer, Simulator, scenario
+from tfarm.dsp.plant import Plant
 from tfarm.dsp.results import enough_modes, ideal_chain
-from tfarm.dsp.simulate import FOLDED_UP, quantisers
+from tfarm.dsp.scenarios import TRIAL_SLEWS
+from tfarm.dsp.sensed import sensed_plant
+from tfarm.dsp.simulate import largest_moment, quantisers
 from tfarm.errors import TfarmError
 from tfarm.loop.circle_crossings import GainMap
 from tfarm.loop.continuous import ContinuousLoop, steep_places
@@ -300,7 +302,7 @@ def sampled_numbers(loop: Sampled) -> LiveNumbers:
     These are 2, 1 where it is damped or driven through a motor, or 0.
     """
     plant = sensed_plant(loop.plant.arm, loop.chain, FED_BACK, loop.plant.count).together
-    folded = PulseTransfer(plant, loop.chain.sampling).folded().plant
+    folded = PulseTransfer(plant, loop.chain.sampling).without_fast_poles().plant
     return {
         **sampling_numbers(loop.chain),
         **_plant(folded),
@@ -385,7 +387,7 @@ def slew_numbers(case: Case) -> LiveNumbers | None:
     arm = case.arm
     chain = case.chain
     try:
-        task = scenario("slew", arm, chain, traces.RECORD_LENGTH * chain.slew.rise_time)
+        task = scenario("slew", arm, chain, TRIAL_SLEWS * chain.slew.rise_time)
         if task.t.size > 5000:
             return None
         ideal = case.through(ideal_chain(chain))
@@ -401,7 +403,7 @@ def slew_numbers(case: Case) -> LiveNumbers | None:
                 [x if math.isfinite(x) else None for x in row] for row in quantisers(chain).tolist()
             ],
             "single": chain.converters.is_single,
-            "bound": FOLDED_UP * arm.bending_scale,
+            "bound": largest_moment(arm),
             "rise": task.busy_until,
             "drive": arm.input.split("_")[1],
             "unit": arm.input_unit,

@@ -29,7 +29,9 @@ from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex
 from tfarm.case import Case
 from tfarm.dsp.discretise import acting_law, with_estimate
-from tfarm.dsp.plant import USUAL_MODES, PulseTransfer, arm_under_chain, sensed_plant
+from tfarm.dsp.plant import USUAL_MODES, arm_under_chain
+from tfarm.dsp.pulse import PulseTransfer
+from tfarm.dsp.sensed import sensed_plant
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import require
 from tfarm.exported.realisations import close_state_space
@@ -103,7 +105,7 @@ def plant_system(case: Case) -> NamedSystem:
     acting, late = acting_law(case)
     signals = with_estimate(acting, late).signals
     sensed = sensed_plant(case.arm, late, list(dict.fromkeys((*signals, "tip_displacement"))), USUAL_MODES)
-    A, B, C = PulseTransfer(sensed.together, late.sampling).folded().matrices()
+    A, B, C = PulseTransfer(sensed.together, late.sampling).without_fast_poles().matrices()
     matrices = A, B[:, None], C, np.zeros((len(C), 1))
     states = tuple(f"plant{n + 1}" for n in range(len(A)))
     name = f"{case.arm.name}, sampled"

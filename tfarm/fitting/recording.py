@@ -44,7 +44,8 @@ from tfarm.arrays import Complex, Real
 from tfarm.case import Case
 from tfarm.dsp.results import simulate_modes
 from tfarm.dsp.scenarios import Scenario
-from tfarm.dsp.simulate import Simulation, Simulator
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.simulation import Simulation
 from tfarm.errors import MISSING, did_you_mean, list_within, must_be_known, name_file, require
 from tfarm.files import read_mat
 from tfarm.fitting.data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet

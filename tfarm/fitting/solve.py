@@ -287,7 +287,7 @@ def is_explained(one: Solution) -> bool | None:
 def nearest_minimum(
     problem: Problem, start: Real, held: dict[int, float] | None = None, evaluations: int = 60
 ) -> Solution:
-    """Return the nearest minimum from a start, some coordinates held at a value, by so many evaluations at most."""
+    """Return the nearest minimum from a start, some coordinates held at a value, by a limited number of evaluations."""
     held = held or {}
     point = start.copy()
     point[list(held)] = list(held.values())

@@ -47,7 +47,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arrays import MACHINE_EPS, Complex, Real
-from tfarm.dsp.plant import SLOW, phi
+from tfarm.dsp.pulse import phi
 from tfarm.errors import ConvergenceError
 from tfarm.loop.left_poles import LeftResponse, bound_left_of, filter_bound, left_response
 from tfarm.loop.sampled import Sampled, with_more_modes
@@ -268,7 +268,7 @@ class Circle:
     @cached_property
     def slow_hub_pole(self) -> int | None:
         """The pole of a hub that friction brings to rest, if it is slow and kept; else None."""
-        found = self.loop.plant.slow_hub_pole(SLOW / self.loop.chain.sampling.period)
+        found = self.loop.plant.slow_hub_pole(self.loop.chain.sampling.period)
         return found if found is not None and self.kept[found] else None
 
     def _slow_hub_pair(self, arcs: Arcs) -> Discs:

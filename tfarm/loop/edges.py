@@ -23,7 +23,8 @@ from tfarm.arm.chain import Chain
 from tfarm.case import Case
 from tfarm.digits import general
 from tfarm.dsp.discretise import acting_law
-from tfarm.dsp.plant import FORGOTTEN, OVERDAMPED, first_distinct, held_amplitude
+from tfarm.dsp.plant import FORGOTTEN, OVERDAMPED, first_distinct
+from tfarm.dsp.pulse import held_amplitude
 from tfarm.loop.circle import Band, complete_band
 from tfarm.loop.circle_crossings import stable_windows
 from tfarm.loop.sampled import Sampled, sampled_loop, with_more_modes

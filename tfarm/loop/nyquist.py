@@ -143,8 +143,8 @@ def upper_contour(loop: Loop, contour: LoopContour, band: float) -> tuple[Comple
     is_resting = poles == 0
     scale = np.where(is_resting, frequency_above_mode(loop.arm, 1), poles)
     step = residue_at * scale
-    beside_pole = loop.loop_function(np.where(is_resting, step, 1j * (poles + step)))
-    of_residue = indent_radius * step * abs(beside_pole)
+    near_pole = loop.loop_function(np.where(is_resting, step, 1j * (poles + step)))
+    of_residue = indent_radius * step * abs(near_pole)
     away = abs(contour.closed - 1j * pole)
     nearest = np.where(away > AXIS_SHARE * pole, away, math.inf).min(axis=1, initial=math.inf)
     radius = np.minimum(np.minimum(of_residue, widest_indent * scale), nearer * nearest)[:, None]

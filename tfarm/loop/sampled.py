@@ -28,14 +28,9 @@ from tfarm.dsp.discretise import (
     law_in_z,
     root_product,
 )
-from tfarm.dsp.plant import (
-    MODES_USED,
-    USUAL_MODES,
-    Plant,
-    PulseTransfer,
-    first_distinct,
-    sensed_plant,
-)
+from tfarm.dsp.plant import MODES_USED, USUAL_MODES, Plant, first_distinct
+from tfarm.dsp.pulse import PulseTransfer
+from tfarm.dsp.sensed import sensed_plant
 from tfarm.errors import ParameterError, did_you_mean
 from tfarm.loop.loop import Loop
 from tfarm.loop.sampled_poles import SampledPoles, polish_poles

@@ -20,7 +20,9 @@ from tfarm.arm.chain import Chain
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing import Steps
 from tfarm.dsp.discretise import LawInZ, lowest_power, root_product, root_product_error
-from tfarm.dsp.plant import Plant, PulseTransfer, SensedPlant, is_analog
+from tfarm.dsp.plant import Plant, is_analog
+from tfarm.dsp.pulse import PulseTransfer
+from tfarm.dsp.sensed import SensedPlant
 from tfarm.records import frozen
 
 # poles and roots nearer to z = 0 have no narrow feature on the circle
@@ -46,7 +48,7 @@ class SampledRig:
     @cached_property
     def pulse(self) -> PulseTransfer:
         """The pulse transfer functions to the signals of the law."""
-        return PulseTransfer(self.plant, self.chain.sampling).folded()
+        return PulseTransfer(self.plant, self.chain.sampling).without_fast_poles()
 
     @property
     def exact(self) -> Callable[[Complex], Complex]:
@@ -91,7 +93,7 @@ class SampledRig:
             delta = start + offset
             at = np.where(is_of_law, -1, base)
             offset = np.where(is_of_law, 1.0, offset)
-        measured = self.pulse.scaled(z, at, offset, delta)
+        measured = self.pulse.scaled_values(z, at, offset, delta)
         rows = np.zeros((1 + len(self.in_z.part_poles), z.size), complex)
         rows[0] = offset * root_product(start, self.in_z.poles, more)
         for part, row, gain, zeros in self.in_z.terms:

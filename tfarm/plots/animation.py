@@ -17,18 +17,18 @@ from tfarm.digits import plain
 from tfarm.dsp import Simulation
 from tfarm.dsp.traces import RATE, Motion, motion_of
 from tfarm.files import write_file
-from tfarm.plots.style import BLUE, GREY, INK, check_records, picture, settled, style
+from tfarm.plots.files import fix_layout
+from tfarm.plots.style import BLUE, GREY, INK, check_records, picture, plot_complex, style
 from tfarm.records import frozen
-
-# an inch, of a frame
-DOTS = 104
 
 
 def _edges(motion: Motion) -> Real:
     """Return least and largest x, and those of y [m]: all that the link and its reference reach, and the hub."""
     reach = motion.arm.reach
     places = np.r_[motion.link.ravel(), motion.reference.ravel(), 0.0]
-    ends = [[each.min() - 0.1 * reach, each.max() + 0.1 * reach] for each in (places.real, places.imag)]
+    low = np.array([places.real.min(), places.imag.min()])
+    high = np.array([places.real.max(), places.imag.max()])
+    ends = np.column_stack([low - 0.1 * reach, high + 0.1 * reach])
     # a loop that diverges leaves the picture
     return np.clip(ends, -1.3 * reach, 1.3 * reach)
 
@@ -46,20 +46,15 @@ def draw_motion(motion: Motion, *, ax: Axes) -> None:
     xlim, ylim = _edges(motion)
     ax.set(aspect="equal", xlim=xlim, ylim=ylim, xticks=[], yticks=[])
     ax.add_patch(Circle((0, 0), max(arm.hub.radius, 0.05 * arm.reach), fc="#e9e9e9", ec=INK, zorder=3))
-    for places, colour, lw, mark in ((motion.reference, GREY, 0.9, ""), (motion.link, BLUE, 3.0, "s")):
-        here = places[motion.still]
-        ax.plot(
-            here.real,
-            here.imag,
-            color=colour,
-            lw=lw,
-            solid_capstyle="butt",
-            marker=mark,
-            ms=6.0,
-            markevery=[-1],
-        )
-    scale = "deflection to scale" if motion.factor == 1 else f"deflection × {motion.factor}"
-    speed = "" if motion.speed == 1 else f", speed × {plain(motion.speed, 2)}"
+    plot_complex(motion.reference[motion.still], ax, color=GREY, lw=0.9, solid_capstyle="butt")
+    link = motion.link[motion.still]
+    plot_complex(link, ax, color=BLUE, lw=3.0, solid_capstyle="butt", marker="s", ms=6.0, markevery=[-1])
+    scale = "deflection to scale"
+    if motion.factor != 1:
+        scale = f"deflection × {motion.factor}"
+    speed = ""
+    if motion.speed != 1:
+        speed = f", speed × {plain(motion.speed, 2)}"
     ax.set_xlabel(f"hub to tip {plain(arm.reach, 3)} m, thin: reference,\n{scale}{speed}")
     ax.set_title(motion.words(motion.still), loc="left", fontsize=9.0, color=INK)
 
@@ -111,13 +106,16 @@ def animate(arm: Arm, run: Simulation) -> Animation:
     return film(motion_of(arm, run))
 
 
-def film(motion: Motion) -> Animation:
-    """Return the film of a motion: the background is drawn once, all that moves or lies on it in each frame."""
+def film(motion: Motion, dpi: int = 104) -> Animation:
+    """Return the film of a motion, of `dpi` dots an inch.
+
+    The background is drawn once, all that moves or lies on it in each frame.
+    """
     figure = draw_motion.figure(motion)
     frames: list[Image.Image] = []
     with style():
-        settled(figure)
-        figure.set_dpi(DOTS)
+        fix_layout(figure)
+        figure.set_dpi(dpi)
         canvas: Any = FigureCanvasAgg(figure)
         (ax,) = figure.axes
         title = ax.set_title(motion.words(0), loc="left", fontsize=9.0, color=INK)
@@ -128,12 +126,14 @@ def film(motion: Motion) -> Animation:
         still = canvas.copy_from_bbox(figure.bbox)
         for frame in range(motion.t.size):
             canvas.restore_region(still)
-            for line, places in zip(ax.lines, (motion.reference[frame], motion.link[frame]), strict=True):
-                line.set_data(places.real, places.imag)
+            for line, places in zip(ax.lines, (motion.reference, motion.link), strict=True):
+                here = places[frame]
+                line.set_data(here.real, here.imag)
             title.set_text(motion.words(frame))
             for each in drawn:
                 ax.draw_artist(each)
-            frames.append(Image.fromarray(np.array(canvas.buffer_rgba())).convert("RGB"))
+            pixels = np.array(canvas.buffer_rgba())
+            frames.append(Image.fromarray(pixels).convert("RGB"))
     # the 48 colours of the first frame are those of all, where Pillow chooses 256 new ones for each
     # almost white is white, as the page is
     colours = frames[0].quantize(48)

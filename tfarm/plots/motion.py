@@ -7,6 +7,7 @@ its learning curves.
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import cycle
 from typing import Any
 
@@ -23,13 +24,16 @@ from tfarm.exact.outputs import OUTPUTS
 from tfarm.fitting.recording import RunComparison
 from tfarm.loop.circle_crossings import GainMap
 from tfarm.loop.plane import Plane
-from tfarm.plots.regions import overlay
+from tfarm.plots.regions import gain_regions
 from tfarm.plots.style import (
     BLUE,
+    DASHED,
+    DOTTED,
     FAINT,
     FIGURES,
     GREY,
     INK,
+    LONG_DASHED,
     MARGINAL,
     ORANGE,
     REGIONS,
@@ -38,41 +42,44 @@ from tfarm.plots.style import (
     Axes,
     Figure,
     by_name,
+    first_of,
     picture,
     safe,
+    zero_line,
 )
 from tfarm.schema import text
 from tfarm.spectrum import Modes
 from tfarm.tuner import LearningCurves, Tuning
 
-# of a drawn mode: about one to a pixel of its picture
-SHAPE_POINTS = 401
 ALONG = "distance from the hub, x [m]"
 DISPLACEMENT = "displacement w(x), largest = 1 [−]"
-TIME = "time [s]"
-DASHED = (0, (4, 3))
-DOTTED = (0, (1, 2))
-LONG_DASHED = (0, (5, 3))
 # colour, mark
 OF_STABILITY = {"stable": (STABLE, "o"), "marginal": (MARGINAL, "s"), "unstable": (UNSTABLE, "x")}
 
 
-def scaled(found: Modes, count: int) -> dict[int, Real]:
-    """w(x) of the first `count` flexible modes by their number, at `SHAPE_POINTS` places even along the arm.
+def scaled_shapes(found: Modes, count: int) -> tuple[Real, dict[int, Real]]:
+    """Return places x even along the arm, and w(x) of the first `count` flexible modes by their number.
 
     Each is scaled to a largest displacement of one, the tip's side positive.
     """
-    x = np.linspace(0.0, found.arm.length, SHAPE_POINTS)
+    # about one to a pixel of a picture
+    x = np.linspace(0.0, found.arm.length, 401)
     rows = zip(found.index.tolist(), found.shape(x), strict=True)
-    return {number: w / (float(abs(w).max()) or 1.0) for number, w in rows if 0 < number <= count}
+    return x, {number: w / (float(abs(w).max()) or 1.0) for number, w in rows if 0 < number <= count}
+
+
+def _flexible(found: Modes) -> int:
+    """Return the number of modes that bend."""
+    return int((found.index > 0).sum())
 
 
 def _rows(found: Modes) -> int:
-    return math.ceil((found.index > 0).sum() / 2)
+    return math.ceil(_flexible(found) / 2)
 
 
 def _grid(figure: Figure, found: Modes) -> None:
-    for ax in figure.subplots(_rows(found), 2, sharey=True).ravel()[(found.index > 0).sum() :]:
+    axes = figure.subplots(_rows(found), 2, sharey=True).ravel()
+    for ax in axes[_flexible(found) :]:
         ax.remove()
     figure.supxlabel(ALONG, fontsize=10.0, color=INK)
     figure.supylabel(DISPLACEMENT, fontsize=10.0, color=INK)
@@ -92,23 +99,23 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
     """
     payload = found.arm.payload
     length = found.arm.length
-    rows = dict(zip(found.index.tolist(), range(found.index.size), strict=True))
-    for one, (number, w) in zip(ax, scaled(found, len(ax)).items(), strict=False):
-        row = rows[number]
+    # width of the hub, as a share of the length
+    hub = 0.06 * length
+    rows = found.index.tolist()
+    x, shapes = scaled_shapes(found, len(ax))
+    for one, (number, w) in zip(ax, shapes.items(), strict=False):
+        row = rows.index(number)
         nodes = found.nodes[row]
-        # width of the hub, as a share of the length
-        hub = 0.06 * length
-        one.axhline(0.0, color=GREY, lw=0.8)
-        one.plot(np.linspace(0.0, length, w.size), w, color=BLUE, lw=1.8)
+        zero_line(one, 0.8)
+        one.plot(x, w, color=BLUE, lw=1.8)
         one.add_patch(Rectangle((-hub, -0.25), hub, 0.5, fc=GREY, ec="none", zorder=3))
         if payload.mass > 0 or payload.inertia > 0:
             one.plot(length, w[-1], "s", ms=8.0, mfc=GREY, mec="none", zorder=3)
         one.plot(nodes, 0 * nodes, "o", ms=5.5, mfc="white", mec=INK, mew=1.3, zorder=4)
         one.set(xlim=(-0.085 * length, 1.11 * length), ylim=(-1.28, 1.28), yticks=[-1, 0, 1])
         one.locator_params(axis="x", nbins=5)
-        omega, hertz = (
-            significant(float(of[row]), 7) for of in (found.natural_frequency, found.natural_frequency_hz)
-        )
+        omega = significant(float(found.natural_frequency[row]), 7)
+        hertz = significant(float(found.natural_frequency_hz[row]), 7)
         places = ", ".join(plain(node, 3) for node in nodes.tolist()) or "none"
         one.set_title(f"Mode {number}:  {omega} rad/s  ({hertz} Hz)\nnodes [m]: {places}", fontsize=9.5)
         if not one.figure.get_supylabel():
@@ -118,38 +125,42 @@ def modes(found: Modes, *, ax: Sequence[Axes]) -> None:
 # ------------------------------------------------------------ over time
 
 
+def over_time(ax: Axes, t: Real, label: str) -> None:
+    """Make axes of a quantity over time, to its end."""
+    ax.set(xlim=(0.0, float(t[-1])), xlabel="time [s]", ylabel=label)
+
+
+def _mark_end(ax: Axes, t: float) -> None:
+    """Draw an upright line where the reference comes to rest."""
+    ax.axvline(t, color=INK, lw=0.8, ls=DOTTED)
+
+
 @picture(
     (Arm, "tfarm.load returns"),
     (Simulation, "tfarm.simulate returns"),
     size=(9.0, 7.0),
     rows=(1.35, 1.0, 1.0),
-    title=lambda arm, runs, what="": (
-        f"{arm.name}: {what or next(iter(by_name(runs).values())).scenario.name}"
-    ),
+    title=lambda arm, runs, what="": f"{arm.name}: {what or first_of(runs).scenario.name}",
 )
 def slew(
     arm: Arm, runs: Simulation | Mapping[str, Simulation], what: str = "", *, ax: Sequence[Axes]
 ) -> None:
-    """Simulations of one scenario (from `tfarm.simulate`; several by name) in three axes, given or new; these.
+    """Draw simulations of one scenario (from `tfarm.simulate`; several by name) in three axes, given or new; these.
 
     Root moment [N m], tip less a rigid arm's on its reference [mm], and the torque of the motor [N m], or its input.
     A note above them names records with too few points for the fastest mode that shows.  `what` is their headline.
     """
     each = by_name(runs)
-    first = next(iter(each.values()))
+    first = first_of(each)
     scenario = first.scenario
     moment, tip, motor = ax
-    moment.step(
-        scenario.t - scenario.period,
-        scenario.rigid_moment,
-        where="post",
-        color=GREY,
-        lw=1.0,
-        ls=DASHED,
-        label="rigid arm",
-    )
-    # several begin with one without feedback: no colours of stability
-    colours = ("#a3a3a3", INK, "#0b7f93", "#8a6d3b")[len(each) == 1 :]
+    t = scenario.t - scenario.period
+    rigid = scenario.rigid_moment
+    moment.step(t, rigid, where="post", color=GREY, lw=1.0, ls=DASHED, label="rigid arm")
+    colours: Sequence[str] = (INK,)
+    if len(each) > 1:
+        # several begin with one without feedback: no colours of stability
+        colours = ("#a3a3a3", INK, "#0b7f93", "#8a6d3b")
     for (name, run), colour in zip(each.items(), cycle(colours), strict=False):
         _draw_curve(traces.curve_of(run, "root_moment"), moment, colour, label=name or None)
         _draw_curve(traces.tip_deviation(arm, run), tip, colour, scale=1e3)
@@ -158,15 +169,16 @@ def slew(
     driven = _input_label(arm) if first.volts is None else "motor [V]"
     labels = ("root moment [N m]", "tip − reference [mm]", driven)
     for axes, label in zip(ax, labels, strict=True):
-        axes.axvline(scenario.busy_until, color=INK, lw=0.8, ls=DOTTED)
-        axes.axhline(0.0, color=GREY, lw=0.6)
-        axes.set(xlim=(0.0, float(scenario.t[-1])), xlabel=TIME, ylabel=label)
+        _mark_end(axes, scenario.busy_until)
+        zero_line(axes)
+        over_time(axes, scenario.t, label)
     points, finer = min(traces.points_a_period(arm, run) for run in each.values())
-    coarse = (
-        f"{plain(points, 2)} points a period of the fastest mode shown; "
-        f"between={finer} gives {traces.POINTS_A_PERIOD}"
-    )
-    moment.set_title(coarse if points < traces.POINTS_A_PERIOD else "", loc="right", fontsize=8.0, color=GREY)
+    enough = traces.POINTS_A_PERIOD
+    if points < enough:
+        coarse = (
+            f"{plain(points, 2)} points a period of the fastest mode shown; between={finer} gives {enough}"
+        )
+        moment.set_title(coarse, loc="right", fontsize=8.0, color=GREY)
 
 
 def _draw_curve(curve: traces.TimeCurve, ax: Axes, colour: str, *, scale: float = 1.0, **looks: Any) -> None:
@@ -176,9 +188,10 @@ def _draw_curve(curve: traces.TimeCurve, ax: Axes, colour: str, *, scale: float 
     if not curve.is_band:
         ax.plot(curve.t, low, color=colour, lw=1.3, **looks)
         return
-    # that of a sampled loop is hatched
-    is_dashed = looks.get("ls") == DASHED
-    own = {"fc": "none", "ec": colour, "hatch": "/////"} if is_dashed else {"color": colour, "alpha": 0.55}
+    own: dict[str, Any] = {"color": colour, "alpha": 0.55}
+    if looks.get("ls") == DASHED:
+        # that of a sampled loop
+        own = {"fc": "none", "ec": colour, "hatch": "/////"}
     ax.fill_between(curve.t, low, high, lw=0.8, label=looks.get("label"), **own)
 
 
@@ -188,9 +201,11 @@ def _draw_signal(ax: Axes, t: Real, y: Real, looks: tuple[str, str], every: int 
     # rises from point to point that are seen; a line with more turns is a band
     rises = np.diff(y)
     rises = rises[abs(rises) > np.ptp(y) / 3000]
-    is_line = np.count_nonzero(np.diff(np.signbit(rises))) <= 400
-    step = math.ceil(t.size / traces.MOST_LINE) if is_line else 1
-    _draw_curve(traces.curve(t[::step], y[::step]), ax, colour, ls=DASHED if every else "-", **how)
+    step = 1
+    if np.count_nonzero(np.diff(np.signbit(rises))) <= 400:
+        step = math.ceil(t.size / traces.MOST_LINE)
+    ls = DASHED if every else "-"
+    _draw_curve(traces.curve(t[::step], y[::step]), ax, colour, ls=ls, **how)
     if every and t.size <= 60 * every:
         ax.plot(t[::every], y[::every], mark, color=colour, ms=3.0, mew=1.0)
 
@@ -210,33 +225,41 @@ def step(found: Step, *, ax: Sequence[Axes]) -> None:
     outputs = [OUTPUTS[name.partition("@")[0]] for name in found.names[:-1]]
     labels = [f"{of.label.replace('at x', 'of the tip')} [{of.unit}]" for of in outputs]
     labels.append(_input_label(found.arm))
-    loops = found.loops.values()
-    # some time after every signal of a stable loop has settled
-    signals = (of for loop in loops for of in (loop.hub, loop.tip, loop.root_moment, loop.torque) if of)
-    settled = [math.inf if of.at_rest_after is None else 1.5 * of.at_rest_after for of in signals]
-    t = found.t[found.t <= max(settled, default=math.inf)]
+    t = found.t[found.t <= _end_of_view(found)]
     every = round(found.period / found.t[1])
     for one, name, label in zip(ax, found.names, labels, strict=True):
-        one.axhline(0.0, color=GREY, lw=0.6)
-        one.set(xlabel=TIME, ylabel=label, xlim=(0.0, t[-1]))
-        if (reference := found.reference.get(name)) is not None:
-            ends = np.sort(reference[-1] * np.array([1 - found.settling_band, 1 + found.settling_band]))
-            one.axhspan(*ends, color=FAINT, lw=0, alpha=0.6, zorder=0)
-            one.plot(
-                t, reference[: t.size], color=GREY, lw=0.8, label=f"reference, {text(found.settling_band)}"
-            )
+        zero_line(one)
+        over_time(one, t, label)
+        reference = found.reference.get(name)
+        if reference is not None:
+            final = reference[-1]
+            low, high = sorted((final * (1 - found.settling_band), final * (1 + found.settling_band)))
+            one.axhspan(low, high, color=FAINT, lw=0, alpha=0.6, zorder=0)
+            label = f"reference, {text(found.settling_band)}"
+            one.plot(t, reference[: t.size], color=GREY, lw=0.8, label=label)
         for loop, each in found.loops.items():
             y = each.signals[name][: t.size]
             label = f"{loop}, {each.stability}"
             samples = every if each is found.sampled else 0
             _draw_signal(one, t[: y.size], y, OF_STABILITY[each.stability], samples, label=label)
-        stable = [each.signals[name] for each in loops if each.hub]
-        if stable and len(stable) < len(loops):
+        stable = [each.signals[name] for each in found.loops.values() if each.hub]
+        if 0 < len(stable) < len(found.loops):
             low = stable[0].min()
             high = stable[0].max()
             # beyond a stable response, of its height
             room = 0.3 * (high - low)
             one.set_ylim(low - room, high + room)
+
+
+def _end_of_view(found: Step) -> float:
+    """Return some time after every signal of a stable loop has settled; infinity where one does not."""
+    ends: list[float] = []
+    for loop in found.loops.values():
+        for signal in (loop.hub, loop.tip, loop.root_moment, loop.torque):
+            if signal:
+                settled = signal.at_rest_after
+                ends.append(math.inf if settled is None else 1.5 * settled)
+    return max(ends, default=math.inf)
 
 
 def _input_label(arm: Arm) -> str:
@@ -258,23 +281,21 @@ def _measured_rows(each: Mapping[str, RunComparison]) -> int:
     grid=lambda figure, each: figure.subplots(_measured_rows(each), len(each), sharex="col", sharey="row"),
 )
 def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes]) -> None:
-    """A column a controller: hub angle above, root moment below where it was measured."""
+    """Draw a column a controller: hub angle above, root moment below where it was measured."""
     axes = np.reshape(np.array(ax), (-1, len(each)))
     for column, (name, found) in zip(axes.T, each.items(), strict=True):
         measured = found.measured
         run = found.run
-        column[0].plot(
-            measured.t, np.degrees(measured.reference), color=GREY, lw=1.0, ls=DASHED, label="reference"
-        )
-        for one, label in zip(column, ("hub angle [deg]", "root moment [N m]"), strict=False):
-            one.set(title=safe(name), xlim=(0.0, float(measured.t[-1])), ylabel=label)
-            one.label_outer()
-        column[-1].set_xlabel(TIME)
+        reference = np.degrees(measured.reference)
+        column[0].plot(measured.t, reference, color=GREY, lw=1.0, ls=DASHED, label="reference")
         signals = (
-            (np.degrees(measured.hub_angle), np.degrees(found.hub_angle)),
-            (measured.root_moment, run.at_samples.root_moment),
+            ("hub angle [deg]", np.degrees(measured.hub_angle), np.degrees(found.hub_angle)),
+            ("root moment [N m]", measured.root_moment, run.at_samples.root_moment),
         )
-        for one, (seen, computed) in zip(column, signals, strict=False):
+        for one, (label, seen, computed) in zip(column, signals, strict=False):
+            over_time(one, measured.t, label)
+            one.set_title(safe(name))
+            one.label_outer()
             if seen.size:
                 one.plot(measured.t, seen, color=ORANGE, label="measured")
             one.plot(run.t, computed, color=BLUE, lw=1.2, label="exact sampled loop")
@@ -286,7 +307,7 @@ def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes])
     title=lambda found: f"{found.trial.arm.name}: the tuner's gain, and where it is proven stable",
 )
 def tuned_gain(found: Tuning, *, ax: Axes) -> None:
-    """A tuned gain over time (from `tfarm.tune`) in its guard, in the axes given or new ones; the axes."""
+    """Draw a tuned gain over time (from `tfarm.tune`) in its guard, in the axes given or new ones; the axes."""
     guard = found.training.guard
     result = found.training.result
     ax.axhspan(
@@ -295,9 +316,9 @@ def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     ax.step(result.t, result.K, where="post", color=INK, lw=1.4, label="the tuner's gain K(t)")
     best = found.best_constant.gain
     ax.axhline(best, color=GREY, lw=1.2, ls=LONG_DASHED, label=f"best constant gain, {significant(best, 3)}")
-    ax.axvline(found.trial.task.busy_until, color=INK, lw=0.8, ls=DOTTED)
-    ax.axhline(0.0, color=GREY, lw=0.7)
-    ax.set(xlim=(0.0, float(result.t[-1])), xlabel=TIME, ylabel=f"gain on the root moment, {MOMENT_GAIN} [−]")
+    _mark_end(ax, found.trial.task.busy_until)
+    zero_line(ax, 0.7)
+    over_time(ax, result.t, f"gain on the root moment, {MOMENT_GAIN} [−]")
 
 
 @picture(
@@ -306,20 +327,18 @@ def tuned_gain(found: Tuning, *, ax: Axes) -> None:
     grid=lambda figure, *_: figure.subplots(1, 2, sharey=True, width_ratios=[1.0, 1.35]),
 )
 def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, ax: Sequence[Axes]) -> None:
-    """Left the map with the guard as a bar and in it the gains that the tuner takes, right the gain over time."""
+    """Draw left the map, with the guard and in it the gains of the tuner as bars, right the gain over time."""
     left, right = ax
-    overlay(continuous, sampled, ax=left)
+    gain_regions(continuous, sampled, ax=left)
     left.set_title("", loc="right")
     # the mark of one controller: the bar is at its rate gain
     left.lines[-1].remove()
     guard = tuning.training.guard
     K = tuning.training.result.K
     at, _ = tuning.trial.loop.gains.point
-    for ends, colour, width, alpha in (
-        ((guard.lo, guard.hi), STABLE, 9, 0.75),
-        ((K.min(), K.max()), INK, 2.4, None),
-    ):
-        left.plot([at, at], ends, solid_capstyle="butt", zorder=6, color=colour, lw=width, alpha=alpha)
+    bar = partial(left.plot, [at, at], solid_capstyle="butt", zorder=6)
+    bar((guard.lo, guard.hi), color=STABLE, lw=9, alpha=0.75)
+    bar((K.min(), K.max()), color=INK, lw=2.4)
     tuned_gain(tuning, ax=right)
     # from 0 to the continuous loop's bound, 1, and a quarter to either side
     left.set_ylim(-0.25, 1.25)
@@ -331,16 +350,16 @@ def draw_gain(tuning: Tuning, continuous: Plane, sampled: Sequence[GainMap], *, 
     size=(9.0, 4.4),
     title=lambda curves, tuning: f"{tuning.trial.arm.name}: learning, {how_many(len(curves.costs), 'seed')}",
 )
-def draw_curves(curves: LearningCurves, tuning: Tuning, *, ax: Axes) -> None:
-    """Learning curves: each seed, median and quartiles, and the baselines; diverged ones leave through the top."""
+def draw_learning(curves: LearningCurves, tuning: Tuning, *, ax: Axes) -> None:
+    """Draw learning curves: each seed, median and quartiles, and baselines; diverged ones leave through the top."""
     trial = np.arange(1, curves.costs.shape[1] + 1)
     # higher costs are drawn at the top edge
     top = 1.25 * tuning.without.cost
-    low, middle, high = (np.minimum(costs, 2 * top) for costs in curves.quartile_curves.values())
-    ax.plot(trial, np.minimum(curves.costs, 2 * top).T, color="#b9b9b9", lw=0.6, zorder=1)
-    ax.fill_between(
-        trial, low, high, color=BLUE, alpha=0.22, lw=0, zorder=2, label="middle half of the seeds"
-    )
+    costs = np.minimum(curves.costs, 2 * top)
+    low, middle, high = np.minimum([*curves.quartile_curves.values()], 2 * top)
+    ax.plot(trial, costs.T, color="#b9b9b9", lw=0.6, zorder=1)
+    half = "middle half of the seeds"
+    ax.fill_between(trial, low, high, color=BLUE, alpha=0.22, lw=0, zorder=2, label=half)
     ax.plot(trial, middle, color=BLUE, lw=1.8, zorder=3, label="median")
     for cost, ls, label in (
         (tuning.without.cost, DOTTED, "no moment feedback"),

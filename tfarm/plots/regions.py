@@ -4,7 +4,9 @@ Each region is a list of intervals of one gain at each value of the other, with 
 and in `dsp`); nothing is read off a raster.  Edges are rounded as they are seen in a picture of that plane.
 """
 
+import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,30 +25,28 @@ from tfarm.loop.circle_crossings import GainMap
 from tfarm.loop.plane import INFINITE, BoundaryLines, Plane
 from tfarm.loop.plane_axes import Axis
 from tfarm.plots.frequency import bode
+from tfarm.plots.labels import gains_words, law_words, name_axes, period_words
 from tfarm.plots.loop_function import draw_loops
 from tfarm.plots.style import (
     COLOURS,
+    DOTTED,
     GREY,
     INK,
     REGIONS,
     STABLE,
     Axes,
     Figure,
-    gains_words,
-    law_words,
-    name_axes,
+    key_area,
+    key_line,
     note,
     picture,
     plain_ticks,
     safe,
+    zero_line,
 )
 
 # proven by the argument of the paper at C = 0
 LYAPUNOV = "{} > 0, {} < 1".format(*PLANE)
-# of contours of damping: no colour of stability
-SLATE = "#3d5468"
-# edges of a sampled loop, and of a second one
-DASH_DOTTED = (0, (6, 2, 1, 2))
 
 
 def _title(found: Plane | GainMap) -> str:
@@ -60,7 +60,7 @@ def _title(found: Plane | GainMap) -> str:
 
 @picture((Plane | GainMap, "tfarm.map returns"), title=_title)
 def gain_map(found: Plane | GainMap, *, ax: Axes) -> None:
-    """The plane of both gains, or of two numbers of a law (from `tfarm.map`), in the axes given or in new ones.
+    """Draw the plane of both gains, or of two numbers of a law (from `tfarm.map`), in the axes given or in new ones.
 
     Colours for the number of unstable poles, hatched where a sampled loop is stable; a black line for the exact
     boundary with frequencies [rad/s] along it, of a law or a sampled loop dots where a pole is on the axis or the unit
@@ -76,26 +76,27 @@ def gain_map(found: Plane | GainMap, *, ax: Axes) -> None:
         if found.is_of_gains:
             draw_boundary(found, found.boundary_lines, x, y, ax)
             return
-    points = [
-        (at, t)
-        for at, each in zip(found.x, found.crossings, strict=False)
-        for t in each.within(y.low, y.high).gain
-    ]
+    points: list[tuple[float, float]] = []
+    for across, each in zip(found.x, found.crossings, strict=False):
+        points += [(across, up) for up in each.within(y.low, y.high).gain]
     if points:
         ax.plot(*np.transpose(points), ".", color=INK, ms=2.0, label="a pole on the stability limit, exact")
 
 
 def ground(found: Plane, x: Axis, y: Axis, ax: Axes) -> None:
-    """Both axes, the colours of the count, and the count in every region that is large enough."""
-    for axis, setter, name in ((x, ax.set_xscale, ax.xaxis), (y, ax.set_yscale, ax.yaxis)):
-        if not axis.is_linear:
-            setter("symlog", linthresh=axis.linear, linscale=axis.linear_scale)
-            plain_ticks(name)
+    """Draw both axes, the colours of the count, and the count in every region that is large enough."""
+    if not x.is_linear:
+        ax.set_xscale("symlog", linthresh=x.linear, linscale=x.linear_scale)
+        plain_ticks(ax.xaxis)
+    if not y.is_linear:
+        ax.set_yscale("symlog", linthresh=y.linear, linscale=y.linear_scale)
+        plain_ticks(ax.yaxis)
     _counts(found, found.unstable, ax)
     ax.set(xlim=(x.low, x.high), ylim=(y.low, y.high))
     name_axes(found.vary, found.arm, found.law, ax)
     if not x.is_linear and x.low < x.linear:
-        ax.set_xlabel(f"{ax.get_xlabel()}; linear up to {plain(x.linear)}, logarithmic beyond")
+        scale = f"linear up to {plain(x.linear)}, logarithmic beyond"
+        ax.set_xlabel(f"{ax.get_xlabel()}; {scale}")
 
 
 def _counts(found: Plane | GainMap, counts: Whole, ax: Axes) -> None:
@@ -107,29 +108,38 @@ def _counts(found: Plane | GainMap, counts: Whole, ax: Axes) -> None:
     for count in np.unique(counts).tolist():
         inside = counts == count
         if count < most or count == counts.max():
-            label = how_many(count, "unstable pole") if count else "stable"
-            if count == INFINITE:
-                label = "infinitely many unstable poles (∞)"
-            elif count > most:
-                label = f"{most} and more unstable poles, at most {count}"
-            ax.fill_between([], [], [], color=image[inside][0], label=label)
-        if not count:
-            continue
-        regions, last = ndimage.label(inside)
-        room = ndimage.distance_transform_edt(np.pad(inside, 1), np.divide(1, counts.shape))[1:-1, 1:-1]
-        middle = room * ndimage.gaussian_filter(room, np.divide(counts.shape, 8))
-        places = ndimage.maximum_position(middle, regions, range(1, last + 1))
-        for row, column in np.reshape(places, (-1, 2)).tolist():
-            # of the picture's width or height: else there is no room for a number
-            if room[row, column] > 0.028:
-                mark = "∞" if count == INFINITE else str(count)
-                ax.text(
-                    found.x[column], found.y[row], mark, fontsize=9.0, ha="center", va="center", clip_on=True
-                )
+            key_area(_count_words(count, most), ax, color=image[inside][0])
+        if count:
+            mark = "∞" if count == INFINITE else str(count)
+            for row, column in _roomy_places(inside):
+                at = (found.x[column], found.y[row])
+                ax.text(*at, mark, fontsize=9.0, ha="center", va="center", clip_on=True)
+
+
+def _count_words(count: int, most: int) -> str:
+    """Return a number of unstable poles, of the colour of `most` and more with the largest number."""
+    if not count:
+        return "stable"
+    if count == INFINITE:
+        return "infinitely many unstable poles (∞)"
+    if count > most:
+        return f"{most} and more unstable poles, at most {count}"
+    return how_many(count, "unstable pole")
+
+
+def _roomy_places(inside: Any) -> list[tuple[int, int]]:
+    """Return row and column of the middle of each region that has room for a number."""
+    regions, last = ndimage.label(inside)
+    sizes = np.divide(1, inside.shape)
+    room = ndimage.distance_transform_edt(np.pad(inside, 1), sizes)[1:-1, 1:-1]
+    middle = room * ndimage.gaussian_filter(room, np.divide(inside.shape, 8))
+    places: Any = ndimage.maximum_position(middle, regions, range(1, last + 1))
+    # of the picture's width or height
+    return [at for at in places if room[at] > 0.028]
 
 
 def colours(unstable: Whole) -> Real:
-    """The colour of each count, the darkest from the last of `REGIONS` on."""
+    """Return the colour of each count, the darkest from the last of `REGIONS` on."""
     number = np.where(unstable == INFINITE, len(REGIONS), unstable)
     return np.take([to_rgb(colour) for colour in REGIONS], number, axis=0, mode="clip")
 
@@ -141,59 +151,63 @@ def contours(across: Real, up: Real, damping: Real, ax: Axes) -> None:
     """
     least = np.nanmin(damping, initial=np.inf)
     largest = np.nanmax(damping, initial=0.0)
-    levels = [
-        each
-        for each in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(least, largest)
-        if least < each < largest
-    ]
-    if not levels:
+    levels: Any = LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(least, largest)
+    levels = levels[(least < levels) & (levels < largest)]
+    if not levels.size:
         return
     # of the logarithm lines are straighter
     logarithm = np.ma.log(np.ma.masked_invalid(damping))
-    lines = ax.contour(
-        across, up, logarithm, np.log(levels[-5:]), colors=SLATE, linewidths=0.8, linestyles="-", zorder=2.5
-    )
-    to_view = ax.transData - ax.transAxes
-    kept = [
-        [
-            p
-            for p in parts
-            if np.array_equal(p[0], p[-1]) or np.hypot(*np.ptp(to_view.transform(p), axis=0)) > 1 / 12
-        ]
-        for parts in lines.allsegs
-    ]
+    # no colour of stability
+    slate = "#3d5468"
+    heights = np.log(levels[-5:])
+    draw = partial(ax.contour, colors=slate, linewidths=0.8, linestyles="-", zorder=2.5)
+    lines = draw(across, up, logarithm, heights)
+    kept = [[part for part in parts if _is_long(part, ax)] for parts in lines.allsegs]
     lines.set_paths([Path.make_compound_path(*map(Path, parts)) for parts in kept])
     for level, parts in zip(lines.levels, kept, strict=True):
         longest = max(parts, key=len, default=())
-        name = f"{plain(100 * np.exp(level), 3)} %"
-        # best place first
-        for share in (0.5, 0.35, 0.65, 0.2, 0.8) if len(longest) > 12 else ():
-            if note(name, longest[int(share * len(longest))], ax, ha="center", color=INK, zorder=6):
-                break
-    ax.plot([], [], color=SLATE, lw=0.8, label="least damping ratio of the first two modes")
+        if len(longest) > 12:
+            _name_contour(f"{plain(100 * np.exp(level), 3)} %", longest, ax)
+    key_line("least damping ratio of the first two modes", ax, color=slate, lw=0.8)
+
+
+def _is_long(line: Real, ax: Axes) -> bool:
+    """Whether a line is closed, or longer than a twelfth of the picture."""
+    if np.array_equal(line[0], line[-1]):
+        return True
+    across, up = np.ptp((ax.transData - ax.transAxes).transform(line), axis=0)
+    return math.hypot(across, up) > 1 / 12
+
+
+def _name_contour(name: str, line: Any, ax: Axes) -> None:
+    """Write a name at the best place along a line that is free."""
+    for share in (0.5, 0.35, 0.65, 0.2, 0.8):
+        if note(name, line[int(share * len(line))], ax, ha="center", color=INK, zorder=6):
+            return
 
 
 def draw_boundary(found: Plane, boundary: BoundaryLines, x: Axis, y: Axis, ax: Axes) -> None:
-    """The exact boundary with its frequencies; without damping an upright line and a level one."""
+    """Draw the exact boundary with its frequencies; without damping an upright line and a level one."""
     if found.arm.loses_at_hub_alone:
         _undamped_boundary(found, boundary.resting, x, y, ax)
         return
     label = "poles on the axis at iω, exact, with ω in rad/s"
-    ax.plot(boundary.points[:, 0], boundary.points[:, 1], color=INK, lw=1.6, label=label)
+    ax.plot(*boundary.points[:, :2].T, color=INK, lw=1.6, label=label)
     if boundary.upright is not None:
         ax.axvline(boundary.upright, color=INK, lw=1.6)
     if boundary.level is not None:
         ax.axhline(boundary.level, color=INK, lw=1.6)
-    along = boundary.ends
-    place = x.place(along[:, 0])
+    across, up, _ = boundary.ends.T
+    place = x.place(across)
     first = max(0.0, float(x.place(np.array(0.0))))
-    inside = (first + 0.07 < place) & (place < 0.93) & (y.low < along[:, 1]) & (along[:, 1] < y.high)
-    for across, up, omega in sorted(along[inside].tolist()):
+    is_across = (first + 0.07 < place) & (place < 0.93)
+    inside = is_across & (y.low < up) & (up < y.high)
+    for across, up, omega in sorted(boundary.ends[inside].tolist()):
         note(significant(omega, 3), (across, up), ax, (0.14, 1.0), ha="center")
 
 
 def _undamped_boundary(found: Plane, resting: Real, x: Axis, y: Axis, ax: Axes) -> None:
-    """Strong around what is stable, thin where the number of unstable poles changes.
+    """Draw it strong around what is stable, thin where the number of unstable poles changes.
 
     That is at the edge of each mode of the locked hub, with its frequency at the right; of a uniform arm all these
     edges are one line.
@@ -206,15 +220,14 @@ def _undamped_boundary(found: Plane, resting: Real, x: Axis, y: Axis, ax: Axes) 
     if found.is_known:
         whole = found.arm.input_per_torque
         omega = ", ".join(significant(float(w), 4) for w in resting)
-        ax.hlines(
-            whole, x.low, x.high, color=INK, lw=0.8, label=f"every mode with the hub at rest: {omega} … rad/s"
-        )
+        label = f"every mode with the hub at rest: {omega} … rad/s"
+        ax.hlines(whole, x.low, x.high, color=INK, lw=0.8, label=label)
         ax.vlines(found.upright, whole, y.high, color=INK, lw=0.8)
         return
     label = "a mode with the hub at rest, ω in rad/s at the right"
-    edges_of_modes = found.crossings[-1].within(y.low, y.high)
-    ax.hlines(edges_of_modes.gain, found.upright, x.high, color=INK, lw=0.5, label=label)
-    for t, omega in sorted(zip(edges_of_modes.gain.tolist(), edges_of_modes.at.tolist(), strict=True)):
+    of_modes = found.crossings[-1].within(y.low, y.high)
+    ax.hlines(of_modes.gain, found.upright, x.high, color=INK, lw=0.5, label=label)
+    for t, omega in sorted(zip(of_modes.gain.tolist(), of_modes.at.tolist(), strict=True)):
         note(significant(omega, 4), (x.high, t), ax, (1.0, 0.05), xytext=(4, 0), fontsize=7.5)
 
 
@@ -225,22 +238,30 @@ def draw_region(
 
     Edges are upright where the region itself begins or ends.
     """
-    # edges of a sampled loop, and of a second one
-    dashed = (0, (5, 2.5))
     line: dict[str, Any] = {"color": INK, "lw": 1.0, "ls": ls, "zorder": 2.5}
-    looks: dict[str, Any] = {"facecolor": REGIONS[0], "lw": 0}
-    key = looks | {"edgecolor": INK, "ls": ls, "lw": 1.0}
+    area: dict[str, Any] = {"facecolor": REGIONS[0], "lw": 0}
+    key = area | {"edgecolor": INK, "ls": ls, "lw": 1.0}
     if hatch:
-        line = {"color": STABLE, "lw": 1.4, "ls": dashed, "zorder": 4.5}
-        key = looks = {"facecolor": "none", "hatch": hatch, "edgecolor": (*to_rgb(STABLE), 0.5), "lw": 0}
+        line = {"color": STABLE, "lw": 1.4, "ls": (0, (5, 2.5)), "zorder": 4.5}
+        area = {"facecolor": "none", "hatch": hatch, "edgecolor": (*to_rgb(STABLE), 0.5), "lw": 0}
+        key = area
     parts = pieces(across, stable)
     for piece in parts:
         x, low, high = np.array(piece.points).T
-        ax.fill_between(x, low, high, zorder=1, **looks)
+        ax.fill_between(x, low, high, zorder=1, **area)
         ax.plot(x, np.transpose([low, high]), **line)
-        ends = np.nonzero([piece.begins and x[0] > across[0], piece.ends])[0]
+        ends = np.flatnonzero([piece.begins and x[0] > across[0], piece.ends])
         ax.vlines(x[-ends], low[-ends], high[-ends], **line)
-    ax.fill_between([], [], [], **key, label=safe(label) + ("" if parts else ": nowhere in this picture"))
+    words = safe(label)
+    if not parts:
+        words += ": nowhere in this picture"
+    key_area(words, ax, **key)
+
+
+def mark_point(point: Sequence[float], mark: str, ax: Axes, ms: float = 7.5, **looks: Any) -> None:
+    """Draw a filled mark at a controller."""
+    across, up = point
+    ax.plot([across], [up], mark, mfc=INK, mec="white", ms=ms, zorder=7, **looks)
 
 
 # ------------------------------------------------------------ continuous and sampled regions
@@ -254,41 +275,45 @@ def draw_region(
         f"{continuous.arm.name}: gains that keep the loop stable, continuous and sampled"
     ),
 )
-def overlay(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes) -> None:
-    """Both regions of the two gains, in the axes given or in new ones; the axes.
+def gain_regions(continuous: Plane, sampled: GainMap | Sequence[GainMap], *, ax: Axes) -> None:
+    """Draw both regions of the two gains, in the axes given or in new ones; the axes.
 
     `continuous` is from `tfarm.map`, `sampled` from `tfarm.dsp.sampled_map`: several, for arms with ever
     less damping, lie on each other.  The point is the controller of the sampled loop.
     """
     planes = sampled if isinstance(sampled, Sequence) else [sampled]
-    ms = plain(1e3 * planes[0].loop.chain.sampling.period)
+    loop = planes[0].loop
     (low, *_, high), (bottom, *_, top) = continuous.axes
     # so that where intervals are cut no edge is seen
     inside = 0.008 * (top - bottom)
-    ax.set(xscale="log" if low > 0 else "linear", xlim=(low, high), ylim=(bottom + inside, top - inside))
+    scale = "log" if low > 0 else "linear"
+    ax.set(xscale=scale, xlim=(low, high), ylim=(bottom + inside, top - inside))
     plain_ticks(ax.xaxis)
     ax.grid(False)
-    ax.axhline(0.0, color=GREY, lw=0.7, zorder=3.5)
+    zero_line(ax, 0.7, zorder=3.5)
     name_axes(PLANE, continuous.arm, continuous.law, ax)
     convention = "u = −{} dθ/dt − {} M;  a positive root moment M accelerates the hub".format(*PLANE)
     ax.set_title(convention, loc="right", fontsize=8.5, color=GREY)
     ax.set_facecolor(REGIONS[1])
     draw_region(continuous.x, continuous.stable_intervals, "stable, continuous: every mode", ax)
-    ax.fill_between([], [], [], color=REGIONS[1], label="unstable, continuous")
+    key_area("unstable, continuous", ax, color=REGIONS[1])
     # with more damping, with less, with its own
     hatches = ("..", "\\\\\\\\", "////")[-len(planes) :]
     for plane, hatch in zip(planes, hatches, strict=True):
         C = plane.loop.plant.arm.damping
-        hypothesis = "" if continuous.arm.damping == C else f", if C were {scientific(C, 1)} s"
-        label = f"stable, sampled every {ms} ms{hypothesis if C else f', C = 0: the first {plane.modes_used} modes'}"
+        label = f"stable, sampled {period_words(loop)}"
+        if not C:
+            label += f", C = 0: the first {plane.modes_used} modes"
+        elif continuous.arm.damping != C:
+            label += f", if C were {scientific(C, 1)} s"
         draw_region(plane.x, plane.stable_intervals, label, ax, hatch=hatch)
     # of a rig the argument needs more: see `tfarm.loop.theorem`
     if continuous.arm.is_uniform:
         label = f"below it: proven by energy at C = 0 ({LYAPUNOV})"
         ax.axhline(1.0, color=INK, lw=1.1, ls=(0, (5, 3)), zorder=4, label=label)
-    loop = planes[0].loop
+    across, up = loop.gains.point
     label = gains_words(loop.law)
-    ax.plot(*loop.gains.point, "o", color="white", mec=INK, mew=1.4, ms=7, zorder=6, ls="none", label=label)
+    ax.plot(across, up, "o", color="white", mec=INK, mew=1.4, ms=7, zorder=6, label=label)
 
 
 # ------------------------------------------------------------ the map of an arm
@@ -313,27 +338,37 @@ def draw_stability_map(
     ground(data.region, x, y, ax)
     contours(*data.coarse.axes, np.where(data.coarse.unstable == 0, data.damping, np.nan), ax)
     draw_boundary(data.region, data.boundary, x, y, ax)
-    if (plane := data.sampled) is not None:
-        ms = plain(1e3 * plane.loop.chain.sampling.period)
-        label = f"stable when sampled every {ms} ms (first {plane.modes_used} modes)"
+    plane = data.sampled
+    if plane is not None:
+        label = f"stable when sampled {period_words(plane.loop)} (first {plane.modes_used} modes)"
         draw_region(plane.x, plane.stable_intervals, label, ax, hatch="////")
     if arm.is_uniform:
-        # at C > 0 only the line without moment feedback is proven
-        dashes, kind = ("-", "proven") if arm.is_undamped else ((0, (1, 1)), "not a proof here")
-        label = f"Lyapunov ({LYAPUNOV}): {kind}"
-        ax.plot([0, 0, x.high], [y.low, 1, 1], color=GREY, lw=2.2, ls=dashes, label=label)
-        if not arm.is_undamped:
-            ax.plot(
-                [0, x.high], [0, 0], color=GREY, lw=1.6, label=f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven"
-            )
+        _draw_lyapunov(arm.is_undamped, x, y, ax)
     for point, label, is_best in laws:
-        mark, size = ("*", 13.0) if is_best else ("D", 8.0)
-        ax.plot(*point, mark, ms=size, mfc=INK, mec="white", mew=1.0, zorder=7, ls="none", label=label)
+        mark = "D"
+        size = 8.0
+        if is_best:
+            mark = "*"
+            size = 13.0
+        mark_point(point, mark, ax, size, mew=1.0, label=label)
     if bounds:
         (a, b), (c, d) = (bounds[name] for name in PLANE)
-        ax.plot(
-            [a, b, b, a, a], [c, c, d, d, c], color=GREY, lw=0.8, ls=(0, (1, 2)), label="bounds of its search"
-        )
+        frame = np.array([(a, c), (b, c), (b, d), (a, d), (a, c)])
+        ax.plot(*frame.T, color=GREY, lw=0.8, ls=DOTTED, label="bounds of its search")
+
+
+def _draw_lyapunov(is_undamped: bool, x: Axis, y: Axis, ax: Axes) -> None:
+    """Draw the frame of Lyapunov's argument; at C > 0 only the line without moment feedback is proven."""
+    ls: Any = "-"
+    kind = "proven"
+    if not is_undamped:
+        ls = (0, (1, 1))
+        kind = "not a proof here"
+    label = f"Lyapunov ({LYAPUNOV}): {kind}"
+    ax.plot([0, 0, x.high], [y.low, 1, 1], color=GREY, lw=2.2, ls=ls, label=label)
+    if not is_undamped:
+        label = f"Lyapunov at C > 0: {MOMENT_GAIN} = 0 proven"
+        ax.plot([0, x.high], [0, 0], color=GREY, lw=1.6, label=label)
 
 
 # ------------------------------------------------------------ two arms, or two laws on one arm
@@ -346,7 +381,7 @@ def _grid(figure: Figure, _: Comparison) -> list[Axes]:
 
 @picture((Comparison, "tfarm.compare returns"), size=(12.0, 6.2), grid=_grid, title=lambda data: data.verdict)
 def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
-    """Magnitude, phase and map of both (from `tfarm.compare`), in three axes, those given or new ones: these.
+    """Draw magnitude, phase and map of both (from `tfarm.compare`), in three axes, those given or new ones: these.
 
     Of two arms the exact responses, of two laws the loop functions L; the map is that of both gains, with exact edges,
     or, where a law is more than these gains, or one in z, of a factor on each controller and its further delay.  With
@@ -356,10 +391,10 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
     if data.is_of_arms:
         bode(dict(zip(data.names, data.responses, strict=True)), ax=(upper, lower))
     else:
-        looks = (
-            {"color": colour, "label": safe(name)} for name, colour in zip(data.names, COLOURS, strict=False)
-        )
-        loops = [(*side.loop_function, how) for side, how in zip(data.sides, looks, strict=True)]
+        loops = [
+            (*side.loop_function, {"color": colour, "label": safe(name)})
+            for side, name, colour in zip(data.sides, data.names, COLOURS, strict=False)
+        ]
         place = "at the samples" if data.is_sampled else "loop opened at the input"
         draw_loops(loops, f"|L|, {place} [dB]", upper, lower)
     upper.set_xlabel("")
@@ -367,39 +402,28 @@ def comparison(data: Comparison, *, ax: Sequence[Axes]) -> None:
     upper.tick_params(labelbottom=False)
     right.grid(False)
     right.set_facecolor(REGIONS[1])
+    # edges of the second one
+    styles = ("-", (0, (6, 2, 1, 2)))
     if data.is_sampled or data.regions is None:
-        _factors(data, right)
+        _factors(data, styles, right)
         return
     first, other = data.regions
-    for found, side, ls, mark in zip(data.regions, data.sides, ("-", DASH_DOTTED), "os", strict=True):
+    for found, side, ls, mark in zip(data.regions, data.sides, styles, "os", strict=True):
         label = "stable" if first == other else f"{side.name}: stable"
         draw_region(found.x, found.stable_intervals, label, right, ls=ls)
         assert side.gains is not None
-        right.plot(*side.gains.point, mark, mfc=INK, mec="white", ms=7.5, zorder=7)
+        mark_point(side.gains.point, mark, right)
     right.set(xlim=(first.x[0], first.x[-1]), ylim=(first.y[0], first.y[-1]))
     name_axes(PLANE, first.arm, first.law, right)
 
 
-def _factors(data: Comparison, ax: Axes) -> None:
-    """Factors that keep each loop stable, over the further delay of its controller."""
+def _factors(data: Comparison, styles: Sequence[Any], ax: Axes) -> None:
+    """Draw the factors that keep each loop stable, over the further delay of its controller."""
     delay, reaches = data.reaches
-    for stable, side, ls in zip(reaches, data.sides, ("-", DASH_DOTTED), strict=True):
+    for stable, side, ls in zip(reaches, data.sides, styles, strict=True):
         draw_region(1e3 * delay, stable, f"{side.name}: stable", ax, ls=ls)
-    ax.plot(
-        [0.0],
-        [1.0],
-        "o",
-        mfc=INK,
-        mec="white",
-        ms=7.5,
-        zorder=7,
-        clip_on=False,
-        label="the controllers as they are",
-    )
+    mark_point((0.0, 1.0), "o", ax, clip_on=False, label="the controllers as they are")
     ax.axhline(1.0, color=INK, lw=0.6)
-    ax.set(
-        xlabel="further delay [ms]",
-        ylabel="factor on the controller [−]",
-        xlim=(0.0, 1e3 * delay[-1]),
-        ylim=(0.0, min(ax.get_ylim()[1], 1e3)),
-    )
+    _, high = ax.get_ylim()
+    ax.set(xlabel="further delay [ms]", xlim=(0.0, 1e3 * delay[-1]))
+    ax.set(ylabel="factor on the controller [−]", ylim=(0.0, min(high, 1e3)))

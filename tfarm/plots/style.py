@@ -1,21 +1,18 @@
-"""The style of all pictures (tfarm.mplstyle), whatever the user's matplotlib settings are; figures, and files.
+"""The style of all pictures (tfarm.mplstyle), whatever the user's matplotlib settings are; figures, notes and ticks.
 
 The figure of a page does not touch pyplot: nothing global, nothing on a screen.  A picture drawn without `ax` is a
-figure of pyplot, so that a notebook shows it.  The same figure gives the same bytes on every run: fixed fonts, a fixed
-salt, no dates.
+figure of pyplot, so that a notebook shows it.
 """
 
-import io
 import re
 import textwrap
-import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache, partial, wraps
 from inspect import signature
-from itertools import count, product
+from itertools import product
 from pathlib import Path
 from typing import Any, get_args
 
@@ -29,18 +26,14 @@ from matplotlib.backends.backend_agg import RendererAgg
 
 # which pages name too
 from matplotlib.figure import Figure as Figure
+from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation, Text
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from matplotlib.transforms import Bbox
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from tfarm.arm import GAINS, LISTED, Arm, Law, shown_unit
-from tfarm.arm.law import NUMBER
+from tfarm.arrays import Complex
 from tfarm.digits import plain
 from tfarm.errors import require
-from tfarm.exact.outputs import signal_words, unit_over
-from tfarm.files import write_file
-from tfarm.loop.varied import ARM_PARAMETERS
 
 INK = "#1a1a1a"
 GREY = "#6b6b6b"
@@ -62,30 +55,25 @@ REGIONS = ("#dcecf9", "#f9cfc0", "#f2ad9b", "#e58a76", "#d46c5a")
 GOOD = GREEN
 LOW = "#735200"
 POOR = ORANGE
-# of numbers that vary
-OTHER_UNITS = ARM_PARAMETERS | {"delay": "s"}
+# patterns of lines
+DASHED = (0, (4, 3))
+LONG_DASHED = (0, (5, 3))
+DOTTED = (0, (1, 2))
 
-METADATA: dict[str, dict[str, str | None]] = {
-    "svg": {"Date": None, "Creator": "tfarm"},
-    "png": {"Software": "tfarm"},
-    "pdf": {"Creator": "tfarm", "Producer": None, "CreationDate": None},
-}
-# an inch, of a PNG: lines of 0.6 points are more than a pixel wide
-PICTURE_DOTS = 160
-# inches at 96 pixels: half a page that is 1280 wide, and one that is 400
+# inches at 96 pixels: half a page that is 1280 wide
 HALF_WIDTH = 6.2
-PHONE_WIDTH = 3.83
-# largest letters inside axes
+# largest letters inside axes of a narrow picture
 SMALL_POINTS = 6.5
 _place: ContextVar[str] = ContextVar("_place", default="")
 
 
 def style() -> AbstractContextManager[None]:
-    """The style of pictures, whatever the user's own settings are."""
-    names = ("tfarm", _place.get()) if _place.get() in ("column", "phone") else ("tfarm",)
-    return matplotlib.style.context(
-        ["default", *(Path(__file__).with_name(f"{name}.mplstyle") for name in names)]
-    )
+    """Return the style of pictures, whatever the user's own settings are."""
+    names = ["tfarm"]
+    if _place.get() in ("column", "phone"):
+        names.append(_place.get())
+    files = [Path(__file__).with_name(f"{name}.mplstyle") for name in names]
+    return matplotlib.style.context(["default", *files])
 
 
 @contextmanager
@@ -137,8 +125,11 @@ FIGURES: dict[Any, Callable[..., Figure]] = {}
 def check_records(of: Sequence[tuple[Any, str]], found: Sequence[Any]) -> None:
     """Raise ParameterError where a record, or one of several in a list or by name, is not of its class."""
     for (kind, origin), value in zip(of, found, strict=False):
-        values = list(value.values()) if isinstance(value, Mapping) else value
-        values = values if isinstance(values, list | tuple) else [values]
+        values = value
+        if isinstance(value, Mapping):
+            values = list(value.values())
+        if not isinstance(values, list | tuple):
+            values = [values]
         is_right = bool(values) and all(isinstance(each, kind) for each in values)
         require(is_right, "plot", value, f"give what {origin}")
 
@@ -156,7 +147,9 @@ class Drawing:
 
     def one_or_all(self, axes: Sequence[Axes]) -> Any:
         """Return the only axes, or all."""
-        return axes[0] if self.grid is None and len(self.rows) == 1 else tuple(axes)
+        if self.grid is None and len(self.rows) == 1:
+            return axes[0]
+        return tuple(axes)
 
     def figure(self, *found: Any, new: Callable[..., Figure] = Figure, **how: Any) -> Figure:
         """Return a figure of its own, for its place."""
@@ -164,19 +157,24 @@ class Drawing:
         bound = signature(self.draw).bind_partial(*found, **how)
         found = bound.args
         with style():
-            inches = self.size(*found) if callable(self.size) else self.size
+            inches = self.size
+            if callable(self.size):
+                inches = self.size(*found)
             # no label clipped
             drawn = new(figsize=placed_size(inches, self.grid is not None), layout="constrained")
             if new is Figure:
                 Measuring(drawn)
+            upper: Sequence[Axes] = ()
             if self.grid is None:
                 drawn.subplots(len(self.rows), sharex=True, height_ratios=self.rows)
+                upper = drawn.axes[:-1]
             else:
                 self.grid(drawn, *found)
                 if _place.get() == "phone":
                     stack(drawn)
             self.draw(*found, ax=self.one_or_all(drawn.axes), **bound.kwargs)
-            for ax in drawn.axes[: len(self.rows) - 1] if self.grid is None else []:
+            # the axes below have the label
+            for ax in upper:
                 ax.set_xlabel("")
             finish(drawn, self.title(*found))
         drawn.again = partial(self.figure, *found, **bound.kwargs)  # type: ignore[attr-defined]  # in another style
@@ -191,10 +189,12 @@ class Drawing:
 
             # loads the backend here: inside a style, the mode of a notebook's would be reset
             pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]
-            return self.one_or_all(self.figure(*found, new=pyplot.figure, **how).axes)
+            drawn = self.figure(*found, new=pyplot.figure, **how)
+            return self.one_or_all(drawn.axes)
         axes = list(np.ravel(np.asarray(ax, dtype=object)))
-        remedy = "{0} axes, as figure.subplots({0}) makes them".format(len(self.rows))
-        require(self.grid or len(self.rows) == len(axes), "ax", len(axes), remedy)
+        needed = len(self.rows)
+        remedy = f"{needed} axes, as figure.subplots({needed}) makes them"
+        require(self.grid or needed == len(axes), "ax", len(axes), remedy)
         with style():
             self.draw(*found, ax=self.one_or_all(axes), **how)
         return self.one_or_all(axes)
@@ -224,26 +224,29 @@ def picture(
         Relative heights of axes above each other; a `grid` of axes is a function of the figure and the records.
     """
 
-    def decorated(draw: Callable[..., None]) -> Any:
+    def decorate(draw: Callable[..., None]) -> Any:
         drawing = Drawing(draw, of, title, size, rows, grid)
 
         @wraps(draw)
-        def shown(*found: Any, ax: Any = None, **how: Any) -> Any:
+        def show(*found: Any, ax: Any = None, **how: Any) -> Any:
             return drawing.show(ax, found, how)
 
-        for kind in get_args(of[0][0]) or (of[0][0],) if len(of) == 1 else ():
-            FIGURES.setdefault(kind, drawing.figure)
-        shown.figure = drawing.figure  # type: ignore[attr-defined]
-        return shown
+        if len(of) == 1:
+            ((kind, _),) = of
+            for each in get_args(kind) or (kind,):
+                FIGURES.setdefault(each, drawing.figure)
+        show.figure = drawing.figure  # type: ignore[attr-defined]
+        return show
 
-    return decorated
+    return decorate
 
 
 def placed_size(inches: tuple[float, float], is_grid: bool) -> tuple[float, float]:
-    """Width and height of a picture at its place, there without its legend; labels need more of a smaller height."""
-    share = inches[1] / inches[0]
+    """Return width and height of a picture at its place, without its legend; labels need more of a smaller height."""
+    width, height = inches
+    share = height / width
     # which needs both columns
-    is_wide = is_grid or inches[0] > 9.5
+    is_wide = is_grid or width > 9.5
     match _place.get():
         # one and both columns of an IEEE paper, less a line of a legend
         case "column" if is_wide:
@@ -251,70 +254,97 @@ def placed_size(inches: tuple[float, float], is_grid: bool) -> tuple[float, floa
         case "column":
             return 3.5, 3.5 * share**0.4 - 0.2
         case "phone":
-            return PHONE_WIDTH, PHONE_WIDTH * (0.36 + 0.75 * share)
-        case "page" if not is_grid and inches[0] > HALF_WIDTH:
+            return phone_size(0.36 + 0.75 * share)
+        case "page" if not is_grid and width > HALF_WIDTH:
             return HALF_WIDTH, HALF_WIDTH * share**0.7 - 0.2
     return inches
+
+
+def phone_size(share: float) -> tuple[float, float]:
+    """Return width and height [inches at 96 pixels] of axes on a page that is 400 wide, of this share of height."""
+    width = 3.83
+    return width, width * share
 
 
 def stack(figure: Figure) -> None:
     """Put axes that are side by side below each other, on a phone: each as wide as the picture."""
     boxes = [ax.get_position() for ax in figure.axes]
-    shares = [
-        min(0.7, box.height * figure.get_figheight() / (box.width * figure.get_figwidth())) for box in boxes
-    ]
+    across, up = figure.get_size_inches()
+    shares = [min(0.7, box.height * up / (box.width * across)) for box in boxes]
     figure.clear()
-    figure.set_figheight(sum(PHONE_WIDTH * share + 0.3 for share in shares))
+    figure.set_figheight(sum(phone_size(share)[1] + 0.3 for share in shares))
     figure.subplots(len(shares), height_ratios=shares, squeeze=False)
 
 
 def make_thin(figure: Figure) -> None:
-    """Letters that a picture made larger than those of a column, its lines and marks, made to fit one."""
-    inside = [text for ax in figure.axes for text in ax.texts]
-    for text in (each for each in figure.findobj() if isinstance(each, Text)):
-        text.set_fontsize(min(text.get_fontsize(), SMALL_POINTS if text in inside else 8.0))
+    """Make letters that a picture made larger than those of a column, its lines and marks, fit one."""
+    shrink(figure.findobj(Text), 8.0)
     for ax in figure.axes:
+        shrink(ax.texts, SMALL_POINTS)
         sizes = product(ax.lines, ("linewidth", "markersize", "markeredgewidth"))
         for each, of in (*sizes, *product(ax.collections, ("linewidth",))):
-            each.set(**{of: 0.7 * np.asarray(getattr(each, f"get_{of}")())})
+            size = np.asarray(getattr(each, f"get_{of}")())
+            each.set(**{of: 0.7 * size})
+
+
+def shrink(texts: Iterable[Any], points: float) -> None:
+    """Give larger letters this size."""
+    for text in texts:
+        text.set_fontsize(min(text.get_fontsize(), points))
 
 
 def finish(drawn: Figure, words: str) -> None:
-    """Legend and headline; at a place room for the legend and short lines of letters, and no headline if narrow."""
+    """Draw legend and headline; at a place make room for the legend, short lines, and no headline if narrow."""
     place = _place.get()
     if place == "column":
         make_thin(drawn)
-    for ax in drawn.axes if place else ():
-        for text in (each for each in (*ax.get_children(), ax.xaxis.label) if isinstance(each, Text)):
-            text.set_text(folded(text.get_text(), 46))
-        # axes that share the height
-        if len(drawn.axes) > 1 and len(label := ax.get_ylabel()) > 14:
-            ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label))
-    for ax in drawn.axes if place == "phone" else ():
-        for each in (ax, *ax.child_axes):
-            each.minorticks_off()
-        for text in ax.texts:
-            text.set_fontsize(SMALL_POINTS)
+    if place:
+        for ax in drawn.axes:
+            fold_words(ax, is_alone=len(drawn.axes) == 1)
+    if place == "phone":
+        for ax in drawn.axes:
+            for each in (ax, *ax.child_axes):
+                each.minorticks_off()
+            for text in ax.texts:
+                text.set_fontsize(SMALL_POINTS)
     legend = legend_below(drawn)
-    drawn.set_figheight(drawn.get_figheight() + legend * bool(place))
+    if place:
+        drawn.set_figheight(drawn.get_figheight() + legend)
     if place in ("", "page"):
-        lines = folded(words.replace(" = ", "\u00a0=\u00a0"), round(11.5 * drawn.get_figwidth()))
+        headline = words.replace(" = ", "\u00a0=\u00a0")
+        lines = fold(headline, round(11.5 * drawn.get_figwidth()))
         drawn.suptitle(safe(lines), x=0.012, ha="left", fontsize=10.5, color=INK)
 
 
+def fold_words(ax: Axes, *, is_alone: bool) -> None:
+    """Fold long lines of axes, and of axes that share the height the label at the left before its unit."""
+    for text in (*ax.get_children(), ax.xaxis.label):
+        if isinstance(text, Text):
+            text.set_text(fold(text.get_text(), 46))
+    label = ax.get_ylabel()
+    if not is_alone and len(label) > 14:
+        ax.set_ylabel(re.sub(r" +(?=\[)", "\n", label))
+
+
 def legend_below(figure: Figure) -> float:
-    """A legend, below the axes, of all labels that no axes has in a legend of its own: its height [inches].
+    """Draw a legend, below the axes, of all labels that no axes has in a legend of its own: its height [inches].
 
     It has as many columns as fit.
     """
-    each = (ax.get_legend_handles_labels() for ax in figure.axes if ax.get_legend() is None)
-    keys = {label: handle for own in each for handle, label in zip(*own, strict=True)}
+    keys: dict[str, Any] = {}
+    for ax in figure.axes:
+        if ax.get_legend() is None:
+            handles, labels = ax.get_legend_handles_labels()
+            keys |= zip(labels, handles, strict=True)
     # two columns of a legend fit half a page
-    labels = [folded(label, 40 if figure.get_figwidth() <= HALF_WIDTH else 100) for label in keys]
-    for number in (5, 3, 2, 1)[2 * (_place.get() == "phone") :] if keys else ():
+    letters = 40 if figure.get_figwidth() <= HALF_WIDTH else 100
+    columns: Sequence[int] = (5, 3, 2, 1)
+    if _place.get() == "phone":
+        columns = columns[2:]
+    for number in columns if keys else ():
         legend = figure.legend(
             keys.values(),
-            labels,
+            [fold(label, letters) for label in keys],
             loc="outside lower left",
             ncols=number,
             fontsize=min(8.2, mpl.rcParams["legend.fontsize"]),
@@ -329,200 +359,99 @@ def legend_below(figure: Figure) -> float:
     return 0.0
 
 
-def folded(text: str, letters: int) -> str:
-    """A text with its lines folded where they are longer."""
+def fold(text: str, letters: int) -> str:
+    """Return a text with its lines folded where they are longer."""
     return "\n".join(textwrap.fill(line, letters) for line in text.splitlines())
 
 
 def note(
-    text: str, at: tuple[float, float], ax: Axes, room: tuple[float, float] = (0.08, 0.045), **looks: Any
+    text: str,
+    at: tuple[float, float],
+    ax: Axes,
+    room: tuple[float, float] = (0.08, 0.045),
+    *,
+    fontsize: float = 8.0,
+    xytext: tuple[float, float] = (0, 0),
+    va: str = "center",
+    zorder: float = 5,
+    **looks: Any,
 ) -> bool:
     """Write a text with a halo where the room around it, of the width and the height, is free of other notes.
 
     Return whether it is.
     """
     to_view = ax.transData - ax.transAxes
-    others = [
-        to_view.transform(each.xy) for each in ax.texts if isinstance(each, Annotation) and each.get_text()
-    ]
-    needed = np.multiply(1.6 if _place.get() == "phone" else 1.0, room)
-    is_free = bool((abs(np.reshape(others, (-1, 2)) - to_view.transform(at)) > needed).any(axis=1).all())
+    notes = [each for each in ax.texts if isinstance(each, Annotation) and each.get_text()]
+    others = np.reshape([to_view.transform(each.xy) for each in notes], (-1, 2))
+    needed = np.array(room)
+    if _place.get() == "phone":
+        needed *= 1.6
+    distances = abs(others - to_view.transform(at))
+    is_free = bool((distances > needed).any(axis=1).all())
     if is_free:
-        own: Any = {
-            "fontsize": 8.0,
-            "textcoords": "offset points",
-            "xytext": (0, 0),
-            "va": "center",
-            "zorder": 5,
-        }
-        halo = [withStroke(linewidth=3.0, foreground="white")]
-        ax.annotate(text, at, annotation_clip=False, path_effects=halo, **own | looks)
+        ax.annotate(
+            text,
+            at,
+            xytext,
+            textcoords="offset points",
+            annotation_clip=False,
+            path_effects=[withStroke(linewidth=3.0, foreground="white")],
+            fontsize=fontsize,
+            va=va,
+            zorder=zorder,
+            **looks,
+        )
     return is_free
 
 
 def by_name(records: Any, name: str = "") -> Mapping[str, Any]:
-    """Several records as they are, or one under this name."""
+    """Return several records as they are, or one under this name."""
     return records if isinstance(records, Mapping) else {name: records}
 
 
+def first_of(records: Any) -> Any:
+    """Return the first of several records by name, or the only one."""
+    return next(iter(by_name(records).values()))
+
+
+def plot_complex(z: Complex, ax: Axes, *marks: str, **looks: Any) -> list[Line2D]:
+    """Draw complex numbers as a curve, Im over Re."""
+    return ax.plot(z.real, z.imag, *marks, **looks)
+
+
+def key_line(label: str, ax: Axes, **looks: Any) -> None:
+    """Give the legend one line for several."""
+    ax.plot([], [], label=label, **looks)
+
+
+def key_area(label: str, ax: Axes, **looks: Any) -> None:
+    """Give the legend one area for several."""
+    ax.fill_between([], [], [], label=label, **looks)
+
+
+def zero_line(ax: Axes, lw: float = 0.6, **looks: Any) -> None:
+    """Draw the level line at 0."""
+    ax.axhline(0.0, color=GREY, lw=lw, **looks)
+
+
 def safe(text: str) -> str:
-    """A name that a person gave as a picture shows it: a dollar begins no formula."""
+    """Return a name that a person gave as a picture shows it: a dollar begins no formula."""
     return text.replace("$", r"\$")
 
 
-def plain_ticks(axis: Axis, digits: int = 3, subs: Sequence[float] = (1.0,)) -> None:
-    """Numbers at the major ticks without powers of ten, none at the minor ones; `subs` of each decade on a log axis."""
+def plain_ticks(axis: Axis, digits: int = 3, *, is_dense: bool = False) -> None:
+    """Write numbers at the major ticks without powers of ten, none at the minor ones.
+
+    On a logarithmic axis these are powers of ten, or, of few decades, 1, 2 and 5 of each: `is_dense`.
+    """
     if axis.get_scale() == "log":
+        subs = (1.0, 2.0, 5.0) if is_dense else (1.0,)
         axis.set_major_locator(LogLocator(subs=subs))
     axis.set_major_formatter(FuncFormatter(lambda x, _: plain(x, digits)))
     axis.set_minor_formatter(NullFormatter())
 
 
-def law_words(law: Law) -> str:
-    """A controller by its name, where it has one of its own."""
-    # which is that of one without a name
-    return "the controller" if law.name == "law" else law.name
-
-
-def gains_words(law: Law, digits: int = 4, but: str = "") -> str:
-    """Each gain with its value, for reading; `but` names one that varies and is left out.  Another law by its name."""
-    gains = law.gains
-    if gains is None:
-        return f"{law_words(law)}, of {', '.join(law.signals)}"
-    # beyond the paper's law
-    named = [gain.name for gain in LISTED if gains[gain.name] or gain.output != "hub_angle"]
-    return ", ".join(f"{name} = {plain(gains[name], digits)}" for name in named if name != but)
-
-
-def number_label(name: str, arm: Arm, law: Law) -> str:
-    """A number of a controller or of the arm with its SI unit, for an axis.
-
-    The coefficient of s^k in the denominator counts as s^k, in the numerator as the unit of a gain times s^k.
-    """
-    for gain in GAINS:
-        if gain.name == name:
-            return f"{name}, gain on the {signal_words(gain.output)[0]} [{shown_unit(name, arm) or '−'}]"
-    if name in OTHER_UNITS:
-        return f"{name.replace('_', ' ')} [{OTHER_UNITS[name]}]"
-    signal, of, place = NUMBER.fullmatch(name).groups("")  # type: ignore[union-attr]
-    if not place and signal not in law.part_gains:
-        return f"{name}, factor on the {'controller' if signal in ('gain', 'all') else signal_words(signal)[0]} [−]"
-    (block,) = (part.block for part in law.parts if part.signals == (signal,))
-    power = len(getattr(block, of)) - 1 - int(place) if place and not law.is_discrete else 0
-    unit = "" if of == "den" else unit_over(arm.input_unit, signal_words(signal)[1])
-    time = {0: "", 1: "s"}.get(power, f"s^{power}")
-    return f"{name} [{f'({unit}) {time}' if unit and time else unit or time or '−'}]"
-
-
-def name_axes(vary: Sequence[str], arm: Arm, law: Law, ax: Axes) -> None:
-    """Along the axes of a plane of two numbers: their names and units."""
-    across, up = (safe(number_label(name, arm, law)) for name in vary)
-    ax.set(xlabel=across, ylabel=up)
-
-
-# ------------------------------------------------------------ files
-
-
-def save_figure(figure: Figure, file: Path, dpi: int = PICTURE_DOTS) -> None:
-    """Write a figure to a file of the kind that its name ends in."""
-    file.write_bytes(content_of(figure, file.suffix.removeprefix("."), dpi))
-
-
-def save_picture(draw: Callable[[Any], Figure], record: Any, path: Path) -> None:
-    """Write the picture of a record as one file, whole: an SVG or a PDF for a column, else a PNG.
-
-    Raises ParameterError, naming --figure, where it cannot be written.
-    """
-    kind = path.suffix.lower().removeprefix(".") or "png"
-    with nullcontext() if kind == "png" else column():
-        content = content_of(draw(record), kind)
-    write_file(path, content, key="--figure")
-
-
-def content_of(figure: Figure, kind: str, dpi: int = PICTURE_DOTS) -> bytes:
-    """Return the file of a figure.
-
-    In an SVG coordinates have two decimals of a point, a 60th of a pixel, where matplotlib writes six.
-    """
-    content = io.BytesIO()
-    with style(), warnings.catch_warnings():
-        # an arm's name may hold any letter
-        warnings.filterwarnings("ignore", "Glyph .* missing")
-        settled(figure)
-        with ticks_kept(figure.axes):
-            figure.savefig(content, format=kind, dpi=dpi, metadata=METADATA[kind])
-    drawn = content.getvalue()
-    if kind != "svg":
-        return drawn
-    # with its colours on a dark page
-    dark = Path(__file__).with_name("dark.svg").read_bytes()
-    return re.sub(rb'(?<= [dxy]=")[^"]+', _short, drawn).replace(b"<defs>", dark, 1)
-
-
-def _short(part: re.Match[bytes]) -> bytes:
-    """Return two decimals, and no space around the letters of a path."""
-    short = re.sub(rb"-?\d+\.\d{3,}", lambda number: b"%.2f" % float(number[0]), part[0])
-    return re.sub(rb"\s*([MLQCz])\s*", rb"\1", short)
-
-
-def settled(figure: Figure) -> None:
-    """Make the layout of a figure once, for all that is drawn of it."""
-    if (layout := figure.get_layout_engine()) is not None:
-        for ax in figure.axes:
-            measure_once(ax)
-        layout.execute(figure)
-        figure.set_layout_engine(None)
-    # at ten digits: the layout's solver orders by address, so its last bit differs
-    for ax in figure.axes:
-        ax.set_position(tuple(np.round(ax.get_position(original=True).bounds, 10).tolist()))
-
-
-def measure_once(ax: Axes) -> None:
-    """Guess the room of ticks and labels around axes in the first of two rounds of a layout, and measure in the second.
-
-    Both would measure; the first has to be near enough for the ticks of the second to be those that are drawn.  Axes of
-    a shape of their own are measured in both.
-    """
-    place = ax.get_subplotspec()
-    rounds = count(start=int(ax.get_aspect() != "auto"))
-
-    def around(*how: Any, **more: Any) -> Any:
-        if place is None or next(rounds):
-            with ticks_kept([ax]):
-                return type(ax).get_tightbbox(ax, *how, **more)
-        # inches
-        guess = [-0.65, -0.5 if place.is_last_row() else -0.05, 0.1, 0.25]
-        inner = ax.get_position(original=True).transformed(ax.figure.transSubfigure)
-        return Bbox.from_extents(*(inner.extents + ax.figure.dpi * np.array(guess)))
-
-    ax.get_tightbbox = around  # type: ignore[method-assign]
-
-
-@contextmanager
-def ticks_kept(axes: Sequence[Axes]) -> Iterator[None]:
-    """Find the ticks of axes and the room of their labels once, while limits and places stay as they are.
-
-    matplotlib finds them anew for each spine, label and title, ten times in a drawing.
-    """
-    both = [axis for ax in axes for each in (ax, *ax.child_axes) for axis in (each.xaxis, each.yaxis)]
-    # names of matplotlib's own
-    kept = [*product(both, ("_update_ticks", "_get_ticklabel_bboxes"))]
-    for axis, name in kept:
-        setattr(axis, name, once(getattr(axis, name)))
-    try:
-        yield
-    finally:
-        for axis, name in kept:
-            delattr(axis, name)
-
-
-def once(call: Callable[..., Any]) -> Callable[..., Any]:
-    """The same call, which returns its first result whatever it is given later."""
-    found: list[Any] = []
-
-    def kept(*given: Any) -> Any:
-        if not found:
-            found.append(call(*given))
-        return found[0]
-
-    return kept
+def few_ticks(axis: Axis) -> None:
+    """Write plain numbers at four ticks, as on small axes."""
+    axis.set_major_locator(MaxNLocator(4))
+    plain_ticks(axis)

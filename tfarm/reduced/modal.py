@@ -85,8 +85,8 @@ def end_residues(
         }
         for row, each in enumerate(wanted):
             is_at_place = each.place == "x" or not each.gauge or k.gauge.share == 0
-            is_at_hub = each.share(x) == 0 and is_at_place and k.reads_hub_moment
-            if each.quantity == "theta" or (each.quantity == "M" and is_at_hub):
+            is_moment_at_hub = each.share(x) == 0 and is_at_place and k.reads_hub_moment
+            if each.quantity == "theta" or (each.quantity == "M" and is_moment_at_hub):
                 damper = (1.0 + k.segments[-1].damping * p) ** each.gauge
                 value = balanced[each.quantity] * float(unit_scale(each, k)) * p**each.power
                 residues[row] = value / (slopes.drive * damper)

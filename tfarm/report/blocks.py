@@ -21,17 +21,16 @@ import tfarm
 from tfarm.arm import ANGLE_GAIN, LISTED, MOMENT_GAIN, PLANE, RATE_GAIN, Arm, HubFeedback, load, presets
 from tfarm.assessment.card import LoopCard
 from tfarm.digits import how_many, join_words, kept_digits, plain, scientific, significant
-from tfarm.plots.style import Figure, drawn_for, save_figure
-from tfarm.schema import Column, Table, quantities, save_table, text, to_json
+from tfarm.plots.files import save_figure
+from tfarm.plots.style import Figure, drawn_for
+from tfarm.schema import Column, Table, quantities, save_table, table, text, to_json
 from tfarm.schema.html import as_html, with_symbols
 
 TEMPLATES = Path(__file__).parent / "templates"
 # folders in that of an arm
 PICTURES = "pictures"
 DATA = "data"
-# of the numbers of a picture in its file: a hundredth of the width of a line is four
-DRAWN_DIGITS = 7
-T = TypeVar("T")
+PageRecord = TypeVar("PageRecord")
 # between title and caption, which no name has in it
 PART = "\ue000"
 PROMISES = (
@@ -52,13 +51,13 @@ PROMISES = (
 
 
 def upper(text: str) -> str:
-    """A text as it begins a sentence."""
+    """Return a text as it begins a sentence."""
     return text[:1].upper() + text[1:]
 
 
 @cache
 def templates() -> Environment:
-    """All templates; only those of pages escape what is put into them."""
+    """Return all templates; only those of pages escape what is put into them."""
     # but for those of a pill
     without = ("stability", "grade", "limited_by", "delay_margin_periods")
     card_rows = {of.key: of for name, of in quantities(LoopCard).items() if name not in without}
@@ -96,13 +95,13 @@ def templates() -> Environment:
 
 @cache
 def _texts() -> Any:
-    """All texts by name; a line break behind a tag is a space in them."""
+    """Return all texts by name; a line break behind a tag is a space in them."""
     source = (TEMPLATES / "prose.txt").read_text(encoding="utf-8").replace("¶", PART)
     return templates().overlay(trim_blocks=False).from_string(source).module
 
 
 def prose(name: str, /, **values: Any) -> str:
-    """The text of that name in templates/prose.txt with these values."""
+    """Return the text of that name in templates/prose.txt with these values."""
     return " ".join(getattr(_texts(), name)(**values).split())
 
 
@@ -111,7 +110,7 @@ def _parts(name: str, values: dict[str, Any]) -> list[str]:
 
 
 def render(template: str, **values: Any) -> str:
-    """A page from its template."""
+    """Return a page from its template."""
     return templates().get_template(template).render(version=tfarm.__version__, **values)
 
 
@@ -122,13 +121,13 @@ def arm_python(arm: Arm) -> str:
 
 
 def gains_python(gains: HubFeedback) -> str:
-    """Python that makes gains at the hub."""
+    """Return the Python that makes gains at the hub."""
     values = {gain.name: float(gains[gain.name]) for gain in LISTED}
     return f"tfarm.HubFeedback({', '.join(f'{name}={value!r}' for name, value in values.items() if value)})"
 
 
 def argument(name: str, preset: bool) -> str:
-    """The name of an arm in a command."""
+    """Return the name of an arm in a command."""
     return shlex.quote(name if preset else f"{name}.toml")
 
 
@@ -158,10 +157,10 @@ class Picture(NamedTuple):
     film: bytes = b""
 
 
-def picture(
+def picture_block(
     kind: str, figure: Figure, *, data: Table | Iterable[Column] = (), stem: str = "", **values: Any
 ) -> Picture:
-    """A picture with title, caption, alternative text and line of Python of its kind; `stem` names its files."""
+    """Return a picture with title, caption, alternative text and line of Python of its kind; `stem` names its files."""
     title, caption, alt, *python = _parts(kind, values)
     return Picture(
         stem or kind.replace("_", "-"), title, caption, alt, figure, _columns(data), "".join(python)
@@ -169,9 +168,14 @@ def picture(
 
 
 def sheet(kind: str, columns: Table | Iterable[Column], /, *, stem: str = "", **values: Any) -> Table:
-    """A table with the title and the caption of its kind; `stem` names its files."""
+    """Return a table with the title and the caption of its kind; `stem` names its files."""
     title, caption = _parts(kind, values)
     return Table(columns=_columns(columns), stem=stem or kind.replace("_", "-"), title=title, caption=caption)
+
+
+def record_sheet(kind: str, records: Any, /, *, stem: str = "", **values: Any) -> Table:
+    """Return a table of records, a row each, with the title and the caption of its kind."""
+    return sheet(kind, table(records), stem=stem, **values)
 
 
 def _columns(of: Table | Iterable[Column]) -> tuple[Column, ...]:
@@ -179,7 +183,7 @@ def _columns(of: Table | Iterable[Column]) -> tuple[Column, ...]:
 
 
 def columns_of(keys: Sequence[str], rows: Iterable[Sequence[Any]]) -> list[Column]:
-    """The columns of these rows, as the data of a picture have them."""
+    """Return the columns of these rows, as the data of a picture have them."""
     return [Column(key, of=of) for key, of in zip(keys, zip(*rows, strict=True), strict=True)]
 
 
@@ -212,19 +216,15 @@ class PageSection:
 
 
 def save_section(section: PageSection, folder: Path, is_paper: bool = False) -> PageSection:
-    """The section with its blocks saved: what remains to be written are words."""
+    """Return the section with its blocks saved: what remains to be written are words."""
     for name in (PICTURES, DATA):
         (folder / name).mkdir(exist_ok=True)
-    return replace(
-        section,
-        blocks=[
-            save_block(block, folder, is_paper) for block in section.blocks if getattr(block, "columns", True)
-        ],
-    )
+    blocks = [block for block in section.blocks if getattr(block, "columns", True)]
+    return replace(section, blocks=[save_block(block, folder, is_paper) for block in blocks])
 
 
 def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> SavedBlock:
-    """A picture as pictures/*.svg, for a paper *.pdf too, its data as data/*.csv; a table as data/*.csv and .json.
+    """Save a picture as pictures/*.svg, for a paper *.pdf too, its data as data/*.csv; a table as data/*.csv and .json.
 
     Of a picture there is a narrow one for phones, *-narrow.svg; a film is small enough.
     """
@@ -248,12 +248,7 @@ def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> 
         files.append(f"{PICTURES}/{block.stem}.gif")
         (folder / files[-1]).write_bytes(block.film)
     if block.data:
-        columns = tuple(
-            replace(
-                each, of=[kept_digits((x,), DRAWN_DIGITS)[0] if isinstance(x, float) else x for x in each.of]
-            )
-            for each in block.data
-        )
+        columns = tuple(replace(each, of=list(map(drawn_number, each.of))) for each in block.data)
         saved = save_table(Table(columns=columns, stem=f"{block.stem}-data"), folder / DATA, ("csv",))
         files += [f"{DATA}/{name}" for name in saved]
     return SavedBlock(
@@ -261,8 +256,15 @@ def save_block(block: Picture | Table, folder: Path, is_paper: bool = False) -> 
     )
 
 
+def drawn_number(x: Any, digits: int = 7) -> Any:
+    """Return a number of a picture as its file has it: a hundredth of the width of a line is four digits."""
+    if isinstance(x, float):
+        return kept_digits((x,), digits)[0]
+    return x
+
+
 def explain_commands(text: str, words: str = "") -> Markup:
-    """A sentence as a page shows it, commands in `...`; a promise leads to its meaning on the page `words`, if any."""
+    """Return a sentence as a page shows it, commands in `...`; a promise leads to its meaning on the page `words`."""
     shown = re.sub("`(.+?)`", r"<code>\1</code>", str(with_symbols(text)))
     for word in PROMISES if words else ():
         linked = rf'<a class="term" href="{words}#{anchor("word", word)}">\g<0></a>'
@@ -271,12 +273,12 @@ def explain_commands(text: str, words: str = "") -> Markup:
 
 
 def anchor(kind: str, name: str) -> str:
-    """A name for links: the equation "(A.1)" becomes "eq-a-1"."""
+    """Return a name for links: the equation "(A.1)" becomes "eq-a-1"."""
     return f"{kind}-{re.sub(r'[^a-z0-9]+', '-', name.lower()).strip('-')}"
 
 
 def write_text(file: Path, text: str) -> None:
-    """A file of text, the same bytes on every system."""
+    """Write a file of text, the same bytes on every system."""
     file.write_text(text, encoding="utf-8", newline="")
 
 
@@ -289,18 +291,20 @@ def keep(folder: Path, kind: str, content: Mapping[str, Any]) -> None:
     write_text(folder / f"{kind}.json", f"{text}\n")
 
 
-def kept_in(folder: Path, kind: str, record: type[T]) -> T | None:
-    """The record in a folder's kind.json; None where there is none, or none of ours."""
+def kept_in(folder: Path, kind: str, record: type[PageRecord]) -> PageRecord | None:
+    """Return the record in a folder's kind.json; None where there is none, or none of ours."""
     try:
         return TypeAdapter(record).validate_json((folder / f"{kind}.json").read_bytes())
     except (OSError, ValueError):
         return None
 
 
-def read_records(out: Path, kind: str, record: type[T]) -> dict[Path, T]:
-    """The records of that kind in the folders of arms, by folder; what is none of ours is passed over."""
-    folders = sorted(
-        (f for f in out.iterdir() if f.is_dir() and not f.name.startswith(".")), key=lambda f: f.name
-    )
-    found = {folder: each for folder in folders if (each := kept_in(folder, kind, record)) is not None}
-    return {folder: each for folder, each in found.items() if getattr(each, "name", "") == folder.name}
+def read_records(out: Path, kind: str, record: type[PageRecord]) -> dict[Path, PageRecord]:
+    """Return the records of that kind in the folders of arms, by folder; what is none of ours is passed over."""
+    found: dict[Path, PageRecord] = {}
+    for folder in sorted(out.iterdir(), key=lambda folder: folder.name):
+        if folder.is_dir() and not folder.name.startswith("."):
+            each = kept_in(folder, kind, record)
+            if each is not None and getattr(each, "name", "") == folder.name:
+                found[folder] = each
+    return found

@@ -92,12 +92,12 @@ def save_live(report: ArmReport, folder: Path) -> None:
 
 
 def _source(text: str) -> str:
-    """The source of a policy that allows an element with that text."""
+    """Return the source of a policy that allows an element with that text."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 def write_assets(folder: Path) -> None:
-    """The script of the live pages."""
+    """Write the script of the live pages."""
     folder.mkdir(exist_ok=True)
     scripts = "".join(
         (TEMPLATES / f"live_{name}.js").read_text(encoding="utf-8")
@@ -116,7 +116,7 @@ class LivePage:
     path: Path
 
     def _repr_html_(self) -> str:
-        """The page in a frame, with its script in it: a notebook serves no other file."""
+        """Return the page in a frame, with its script in it: a notebook serves no other file."""
         script = (self.path.parents[1] / ASSETS / SCRIPT).read_text(encoding="utf-8")
         page = self.path.read_text(encoding="utf-8").replace(SCRIPTS, f"script-src {_source(script)}", 1)
         page = page.replace(f'<script src="../{ASSETS}/{SCRIPT}">', f"<script>{script}")

@@ -3,11 +3,12 @@
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, unit_of, warn_of_cancellations
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
+from tfarm.arrays import Real
 from tfarm.assessment.stability_map import DESIGNED_MODES
 from tfarm.digits import plain, significant
 from tfarm.dsp.discretise import rule_in_words
@@ -15,10 +16,19 @@ from tfarm.errors import ConvergenceError, TfarmError
 from tfarm.loop.loci import Loci, round_branches
 from tfarm.loop.margins import Margins
 from tfarm.loop.nyquist import Nyquist
-from tfarm.loop.plane import deepest_moment_gain
 from tfarm.loop.poles import Poles
 from tfarm.plots import loop_function, regions, roots
-from tfarm.report.blocks import Fact, PageSection, Picture, columns_of, picture, prose, sheet, upper
+from tfarm.report.blocks import (
+    Fact,
+    PageSection,
+    Picture,
+    columns_of,
+    picture_block,
+    prose,
+    record_sheet,
+    sheet,
+    upper,
+)
 from tfarm.report.overview import results
 from tfarm.report.page import ArmReport, PageCase, has_loop, sign_words
 from tfarm.response.signals import Signals, sign_convention
@@ -30,25 +40,28 @@ from tfarm.schema import Column, Quantity, Table, across, curve_table, quantitie
 def margins_section(report: ArmReport) -> PageSection:
     """Verdict, margins, crossings and spillover of each controller."""
     found = [(each, each.margins) for each in report.in_s]
-    words = [] if report.has_loop else [prose("no_loop", arm=report.arm)]
-    words += [] if report.laws else [sign_words(report.arm)]
+    words = []
+    if not report.has_loop:
+        words.append(prose("no_loop", arm=report.arm))
+    if not report.laws:
+        words.append(sign_words(report.arm))
     blocks: list[Picture | Table] = [*(_bode_picture(each) for each, _ in found), margin_table(found)]
     for each, it in found:
         crossovers = {"gain_crossovers": it.gain_crossovers, "phase_crossovers": it.phase_crossovers}
         for kind, rows in crossovers.items():
-            blocks.append(sheet(kind, table(rows), stem=each.stem(kind.replace("_", "-")), each=each))
+            blocks.append(record_sheet(kind, rows, stem=each.stem(kind.replace("_", "-")), each=each))
         own = table(it.stability_intervals)
         blocks.append(sheet("intervals", own, stem=each.stem("windows"), each=each, note=it.intervals_note))
         try:
             few = each.spillover
-            blocks.append(sheet("spill", table(few.models), stem=each.stem("spill"), each=each, found=few))
+            blocks.append(record_sheet("spill", few.models, stem=each.stem("spill"), each=each, found=few))
         except TfarmError as error:
             words.append(f"Spillover of {each.name} is not determined: {error}.")
     return PageSection(title="Stability and stability margins", words=words, blocks=blocks)
 
 
 def margin_table(found: Sequence[tuple[PageCase, Margins]]) -> Table:
-    """A row a quantity, a column a controller."""
+    """Return a row a quantity, a column a controller."""
     leads = [each.name for each, it in found if it.in_band is not None and it.in_band.phase < 0]
     undamped = any(it.stability.loop.arm.is_undamped for _, it in found)
     own = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
@@ -64,7 +77,7 @@ def _bode_picture(each: PageCase) -> Picture:
         for row in zip(own.omega, own.L.real, own.L.imag, strict=True)
     )
     data = columns_of(("period_s", "omega_rad_s", "re_L", "im_L"), rows)
-    return picture(
+    return picture_block(
         "loop_function",
         loop_function.loop.figure(curve),
         stem=each.stem("bode"),
@@ -87,8 +100,8 @@ def nyquist_section(report: ArmReport) -> PageSection:
         disc = loop_function.disc.figure(found, name=each.name)
         stem = each.stem("nyquist")
         blocks += [
-            picture("nyquist_plot", linear, stem=stem, data=curve_table(found), each=each, found=found),
-            picture("nyquist_disc", disc, stem=f"{stem}-disc", each=each, found=found),
+            picture_block("nyquist_plot", linear, stem=stem, data=curve_table(found), each=each, found=found),
+            picture_block("nyquist_disc", disc, stem=f"{stem}-disc", each=each, found=found),
         ]
     own = any(found.unstable_open for found in counts.values())
     blocks.append(sheet("nyquist_count", across(counts), own=own))
@@ -101,7 +114,7 @@ def nyquist_section(report: ArmReport) -> PageSection:
 
 
 def law_section(report: ArmReport) -> PageSection:
-    """Each law: its signals and input, its entries, its discretisation, and its warnings."""
+    """Return each law: its signals and input, its entries, its discretisation, and its warnings."""
     named = report.cases
     words = [
         prose(
@@ -116,7 +129,7 @@ def law_section(report: ArmReport) -> PageSection:
     ]
     words.append(sign_words(report.arm))
     words.append(prose("not_on_page", discrete=[each.name for each in named if each.law.is_discrete]))
-    blocks = [sheet("law_entries", table([entry for each in named for entry in signal_entries(each)]))]
+    blocks = [record_sheet("law_entries", [entry for each in named for entry in signal_entries(each)])]
     return PageSection(
         title="The controller" + "s" * (len(named) > 1),
         answer=prose("laws", each=named),
@@ -139,7 +152,7 @@ class LawEntry(NamedTuple):
 
 
 def signal_entries(each: PageCase) -> Iterator[LawEntry]:
-    """Every signal of a law with every digit; matrices are in its file alone."""
+    """Yield every signal of a law with every digit; matrices are in its file alone."""
     law = each.law
     for part in law.parts:
         num: list[float] | str = "matrices, in its file"
@@ -157,25 +170,29 @@ def signal_entries(each: PageCase) -> Iterator[LawEntry]:
 
 
 def map_section(report: ArmReport) -> PageSection:
-    """The stability regions of both gains, continuous and sampled."""
+    """Return the stability regions of both gains, continuous and sampled."""
     arm = report.arm
     data = report.map
     designed = report.best
     laws = []
-    points = [report.gains.point, *([] if designed is None else [designed.law.point])]
+    points = [report.gains.point]
+    bounds = {}
+    if designed is not None:
+        points.append(designed.law.point)
+        bounds = designed.bounds
     for each, point in zip(report.in_s, points, strict=True):
         label = f"{each.title};\n{each.brief.short}"
         laws.append(regions.MarkedLaw(point, label, each.key == "best"))
-    drawn = picture(
+    drawn = picture_block(
         "map",
-        regions.draw_stability_map.figure(data, laws, {} if designed is None else designed.bounds),
+        regions.draw_stability_map.figure(data, laws, bounds),
         data=data.columns,
         found=data,
         arm=arm,
         chain=report.chain,
         band=report.band,
         unit=f"{plain(report.rate_unit, 4)} {unit_of(RATE_GAIN, arm)}",
-        deepest=deepest_moment_gain(arm),
+        deepest=report.deepest_moment_gain,
     )
     return PageSection(
         title="Stability region of both gains", facts=continuous_interval_facts(report), blocks=(drawn,)
@@ -183,7 +200,7 @@ def map_section(report: ArmReport) -> PageSection:
 
 
 def continuous_interval_facts(report: ArmReport) -> list[Fact]:
-    """The stability intervals of each gain of the continuous-time loop, the other at its default."""
+    """Return the stability intervals of each gain of the continuous-time loop, the other at its default."""
     return [
         Fact(f"{row.name}, continuous", text(row.intervals, 4) or "no value", row.unit)
         for row in report.cases[0].margins.stability_intervals
@@ -192,7 +209,7 @@ def continuous_interval_facts(report: ArmReport) -> list[Fact]:
 
 
 def recommended_section(report: ArmReport) -> PageSection:
-    """The gains that damp the first modes of the sampled loop best, with their result card.
+    """Return the gains that damp the first modes of the sampled loop best, with their result card.
 
     They are recommended unless a margin of the sampled loop is poor.
     """
@@ -214,7 +231,7 @@ def recommended_section(report: ArmReport) -> PageSection:
 
 
 def locus_section(report: ArmReport) -> PageSection:
-    """Poles of the controllers; of an arm's own page root loci along each gain too."""
+    """Return poles of the controllers; of an arm's own page root loci along each gain too."""
     words: list[str] = []
     tables: list[Table] = []
     of = quantities(Poles)["values"]
@@ -237,9 +254,9 @@ def locus_section(report: ArmReport) -> PageSection:
             continue
         stem = f"locus-{name}"
         blocks += [
-            picture("locus", roots.draw_loci.figure(own), stem=stem, data=locus_data(own), found=own),
-            sheet("branches", table(own.rows), stem=f"{stem}-branches", found=own),
-            sheet("crossings", table(own.exact.crossings), stem=f"{stem}-crossings", found=own),
+            picture_block("locus", roots.draw_loci.figure(own), stem=stem, data=locus_data(own), found=own),
+            record_sheet("branches", own.rows, stem=f"{stem}-branches", found=own),
+            record_sheet("crossings", own.exact.crossings, stem=f"{stem}-crossings", found=own),
         ]
     first, second = (report.gains.gain_text(name, partial(plain, digits=4), report.arm) for name in PLANE)
     others = dict(zip(PLANE, (second, first), strict=True))
@@ -248,15 +265,15 @@ def locus_section(report: ArmReport) -> PageSection:
 
 
 def locus_data(data: Loci) -> Sequence[Column]:
-    """The poles of the exact and of the reduced locus, to the digits that hold on every processor."""
-    return [
-        Column(data.name, of=data.exact.gain),
-        *(
-            Column(
-                f"{which}_{n}_{part}", of=["" if math.isnan(value) else value for value in values.tolist()]
-            )
-            for which, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches))
-            for n, row in enumerate(round_branches(branches))
-            for part, values in (("re", row.real), ("im", row.imag))
-        ),
-    ]
+    """Return the poles of the exact and of the reduced locus, to the digits that hold on every processor."""
+    columns = [Column(data.name, of=data.exact.gain)]
+    for which, branches in (("exact", data.exact.branches), ("reduced", data.reduced.branches)):
+        for n, row in enumerate(round_branches(branches)):
+            columns.append(Column(f"{which}_{n}_re", of=numbers_or_blanks(row.real)))
+            columns.append(Column(f"{which}_{n}_im", of=numbers_or_blanks(row.imag)))
+    return columns
+
+
+def numbers_or_blanks(values: Real) -> list[Any]:
+    """Return numbers, nothing in the place of those that are none."""
+    return ["" if math.isnan(value) else value for value in values.tolist()]

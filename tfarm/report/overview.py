@@ -9,25 +9,14 @@ from typing import Any
 
 from tfarm.assessment.card import ResultCard
 from tfarm.errors import TfarmError
+from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import draw_card
-from tfarm.plots.style import save_figure
 from tfarm.report.blocks import PICTURES, PageSection, SavedBlock, keep, prose
 from tfarm.report.page import ArmReport
 from tfarm.schema import table, text, to_dict
 
 # a line
 SHORT = {"gain_margin_db": "GM", "phase_margin_deg": "PM", "delay_margin_ms": "DM", "peak_sensitivity": "Ms"}
-# sections of the first page in their order: anchor, name of a picture, which of several; of modes a table
-SHOWN = (
-    ("margins-map", "map", 0),
-    ("margins", ".+-bode", 0),
-    ("sampled", "sampled-(slew|measured)", 0),
-    ("bode-root-moment", "bode-root-moment", 0),  # where there is no loop function
-    ("modes", "", 0),
-    ("locus", "locus-.+", -1),
-    ("arm", "arm", 0),
-    ("fit", "fit-overlay", 0),
-)
 
 
 @dataclass(frozen=True)
@@ -70,7 +59,7 @@ def save_card(report: ArmReport, folder: Path) -> None:
 
 
 def summary(report: ArmReport) -> str:
-    """The arm in one sentence, and the laws that its page is about in another."""
+    """Return the arm in one sentence, and the laws that its page is about in another."""
     return prose("summary", arm=report.arm, laws=[each.own_name for each in report.cases if report.laws])
 
 
@@ -83,7 +72,7 @@ def results(found: ResultCard, controller: str) -> list[dict[str, Any]]:
 
 
 def in_words(value: Any) -> Any:
-    """A value of JSON as a page shows it."""
+    """Return a value of JSON as a page shows it."""
     digits = 4
     if isinstance(value, dict):
         return {key: in_words(each) for key, each in value.items()}
@@ -92,7 +81,19 @@ def in_words(value: Any) -> Any:
 
 def blocks(sections: Mapping[str, PageSection]) -> Iterator[tuple[PageSection, SavedBlock | None]]:
     """The sections of the first page, in their order, each with its picture: none of modes, or where it failed."""
-    for anchor, stem, place in SHOWN:
+    # anchor, name of a picture, which of several; of modes a table
+    shown = (
+        ("margins-map", "map", 0),
+        ("margins", ".+-bode", 0),
+        ("sampled", "sampled-(slew|measured)", 0),
+        # where there is no loop function
+        ("bode-root-moment", "bode-root-moment", 0),
+        ("modes", "", 0),
+        ("locus", "locus-.+", -1),
+        ("arm", "arm", 0),
+        ("fit", "fit-overlay", 0),
+    )
+    for anchor, stem, place in shown:
         section = sections.get(anchor)
         if section is None or (anchor.startswith("bode") and "margins" in sections):
             continue

@@ -34,6 +34,7 @@ from tfarm.audit.published import PublishedRow, validate
 from tfarm.case import Case, OfCase
 from tfarm.dsp import Chain, Simulation, load_chain, results, traces
 from tfarm.dsp.discretise import acting_law
+from tfarm.dsp.scenarios import TRIAL_SLEWS
 from tfarm.errors import ConvergenceError, ParameterError, one_line
 from tfarm.exported.live_loop import LiveNumbers, live_data
 from tfarm.fitting.data import Measured
@@ -45,6 +46,7 @@ from tfarm.loop.curve import LoopCurve
 from tfarm.loop.loci import Loci, loci
 from tfarm.loop.margins import Margins, margins
 from tfarm.loop.nyquist import Nyquist, nyquist_of
+from tfarm.loop.plane import deepest_moment_gain
 from tfarm.loop.plane_axes import ranges_of
 from tfarm.loop.poles import Poles, closed_loop_poles
 from tfarm.loop.sampled_analysis import Analysis
@@ -52,7 +54,7 @@ from tfarm.loop.sampled_brief import SampledBrief, sampled_brief
 from tfarm.loop.sampled_modes import STRONGER, SampledLoci, sampled_loci
 from tfarm.loop.sampled_verdict import Verdict, sampled_verdict
 from tfarm.loop.spillover import Spill, spill
-from tfarm.plots.style import gains_words
+from tfarm.plots.labels import gains_words
 from tfarm.records import frozen
 from tfarm.report.blocks import argument, prose
 from tfarm.response.frequency import Bode, bode
@@ -131,7 +133,7 @@ class PageCase(OfCase):
         return f"{self.name}: {self.gains}"
 
     def stem(self, suffix: str) -> str:
-        """The name of a file of it."""
+        """Return the name of a file of it."""
         return f"{self.key.replace('_', '-')}-{suffix}"
 
     # the continuous-time loop, and both
@@ -195,7 +197,7 @@ class PageCase(OfCase):
     @property
     def slew(self) -> Simulation:
         """The slew of the sampled loop, with the records that a picture needs."""
-        duration = traces.RECORD_LENGTH * self.chain.slew.rise_time
+        duration = TRIAL_SLEWS * self.chain.slew.rise_time
         return results.simulate_for_picture(self.case, "slew", duration)
 
     def film(self, run: Simulation) -> traces.Motion:
@@ -337,6 +339,11 @@ class ArmReport(NamedTuple):
         return rate_unit(self.arm)
 
     @property
+    def deepest_moment_gain(self) -> float:
+        """The lowest moment gain at which unstable gains are searched."""
+        return deepest_moment_gain(self.arm)
+
+    @property
     def regions(self) -> StableRegions:
         """The stability regions around the gains of the page, continuous and sampled."""
         return stable_regions(self.cases[0].case)
@@ -447,7 +454,7 @@ def best(arm: Arm, chain: Chain) -> Design | None:
 
 
 def sign_words(arm: Arm) -> str:
-    """The law, and the sign of its moment gain."""
+    """Return the law, and the sign of its moment gain."""
     return prose("signs", law=sign_of(arm))
 
 
@@ -460,7 +467,7 @@ def is_preset(arm: Arm, chain: Chain) -> bool:
 
 
 def file_of(report: ArmReport) -> str:
-    """The arm's file with its chain, and with the law that the page is about where TOML can say that alone."""
+    """Return the arm's file with its chain, and with the law that the page is about where TOML can say that alone."""
     law = own_law(report)
     if law is None:
         return file_text(report.arm, report.chain)
@@ -468,7 +475,7 @@ def file_of(report: ArmReport) -> str:
 
 
 def own_law(report: ArmReport) -> str | None:
-    """The table [law] of the one law of a page; None of none or several, or of one with files of its own."""
+    """Return the table [law] of the one law of a page; None of none or several, or of one with files of its own."""
     with suppress(ParameterError):
         if len(report.laws) == 1 and report.laws[0].measured is None:
             return law_toml(report.cases[0].law)

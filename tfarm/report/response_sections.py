@@ -18,8 +18,8 @@ from tfarm.digits import column_format, fix_decimals, join_words, kept_digits, p
 from tfarm.errors import CertificationError, ConvergenceError
 from tfarm.fitting.fit import ARMS
 from tfarm.plots import arm_sketch, frequency, motion
-from tfarm.plots.style import gains_words
-from tfarm.report.blocks import Fact, PageSection, Picture, picture, prose, sheet, upper
+from tfarm.plots.labels import gains_words
+from tfarm.report.blocks import Fact, PageSection, Picture, picture_block, prose, record_sheet, sheet, upper
 from tfarm.report.page import ArmReport
 from tfarm.response.frequency import AXIS_SHARE, Bode
 from tfarm.schema import Column, Quantity, Table, curve_table, table
@@ -28,11 +28,10 @@ from tfarm.spectrum.listing import SHAPE_DIGITS, beyond_the_box
 
 # as `tfarm modes` lists them; shapes in three rows of two
 TABLED_MODES = 10
-THEORIES: tuple[Theory, ...] = ("timoshenko", "shear", "rayleigh", "euler-bernoulli")
 
 
 def arm_section(report: ArmReport) -> PageSection:
-    """The first part of every page: headline numbers, slips of units, the theory, and the parameters."""
+    """Return the first part of every page: headline numbers, slips of units, the theory, and the parameters."""
     arm = report.arm
     input = input_words(arm)
     words = (
@@ -46,7 +45,7 @@ def arm_section(report: ArmReport) -> PageSection:
         words=list(filter(None, words)),
         items=arm.assumptions,
         blocks=(
-            picture("arm", arm_sketch.sketch.figure(arm), arm=arm, input=input),
+            picture_block("arm", arm_sketch.sketch.figure(arm), arm=arm, input=input),
             sheet(
                 "parameters",
                 table([*file_parameters(arm, tomllib.loads(file_text(arm, report.chain)))]),
@@ -92,7 +91,7 @@ class FileParameter(NamedTuple):
 
 
 def file_parameters(arm: Arm, table: Mapping[str, Any], under: str = "") -> Iterator[FileParameter]:
-    """The numbers of a table of an arm's file by their keys, those of tables in it too."""
+    """Yield the numbers of a table of an arm's file by their keys, those of tables in it too."""
     for key, value in table.items():
         if isinstance(value, dict):
             yield from file_parameters(arm, value, f"{under}{key}.")
@@ -116,7 +115,7 @@ class Derived(NamedTuple):
 
 
 def derived_table(arm: Arm) -> Table:
-    """The numbers that follow from the parameters alone."""
+    """Return the numbers that follow from the parameters alone."""
     turns = arm.has_rigid_mode and not arm.is_locked
     rows = [
         Derived(f"segment {i}: " * bool(arm.outer) + quantity, symbol, value, unit)
@@ -168,15 +167,16 @@ def derived_table(arm: Arm) -> Table:
             unit_of(RATE_GAIN, arm),
         ),
     ]
-    return sheet("derived", table([row for row in rows if row.value is not False]), arm=arm)
+    return record_sheet("derived", [row for row in rows if row.value is not False], arm=arm)
 
 
 # ------------------------------------------------------------ modes
 
 
 def modes_section(report: ArmReport) -> PageSection:
-    """Everything about free vibration: at C = 0, and the eigenvalues at the arm's own C."""
+    """Return everything about free vibration: at C = 0, and the eigenvalues at the arm's own C."""
     drawn_modes = 6
+    of_theories: tuple[Theory, ...] = ("timoshenko", "shear", "rayleigh", "euler-bernoulli")
     arm = report.arm
     words = [prose("complete_modes")]
     blocks: list[Picture | Table] = [modal_table(report)]
@@ -189,15 +189,15 @@ def modes_section(report: ArmReport) -> PageSection:
         except (ConvergenceError, CertificationError) as error:
             words.append(prose("no_damped_table", why=error))
     drawn = report.modes(drawn_modes)
-    shapes = motion.scaled(drawn, drawn_modes)
+    x, shapes = motion.scaled_shapes(drawn, drawn_modes)
     columns = (
-        Column("x_m", of=np.linspace(0.0, arm.length, motion.SHAPE_POINTS)),
+        Column("x_m", of=x),
         *(Column(f"mode_{number}", of=np.round(w, SHAPE_DIGITS - 1) + 0.0) for number, w in shapes.items()),
     )
     nodes = [own for number, own in zip(drawn.index, drawn.nodes, strict=True) if number in shapes]
     blocks += [
-        picture("mode_shapes", motion.modes.figure(drawn), data=columns, arm=arm, nodes=nodes),
-        theories({theory: report.modes(TABLED_MODES, theory) for theory in THEORIES}),
+        picture_block("mode_shapes", motion.modes.figure(drawn), data=columns, arm=arm, nodes=nodes),
+        theories({theory: report.modes(TABLED_MODES, theory) for theory in of_theories}),
         sensitivity_table(report.modes(TABLED_MODES)),
     ]
     return PageSection(title="Modes", words=words, blocks=blocks)
@@ -253,7 +253,7 @@ def rounds_to(cell: str, bracket: tuple[str, str], divisor: Decimal = Decimal(1)
 
 
 def damped_tables(report: ArmReport, count: int = TABLED_MODES) -> list[Table]:
-    """The arm's damped modes, each number certified to 12 digits and printed to fewer; then those of no mode."""
+    """Return the arm's damped modes, each number certified to 12 digits and printed to fewer; then those of no mode."""
     arm = report.arm
     damped = report.proven_damped_modes(count)
     found = report.mode_list(count)
@@ -273,12 +273,12 @@ def damped_tables(report: ArmReport, count: int = TABLED_MODES) -> list[Table]:
             beyond=beyond_the_box(arm),
             edges=[plain(round(x)) if abs(x) >= 100 else plain(x, 3) for x in damped.box],
         ),
-        *([sheet("unassigned_eigenvalues", table(found.unassigned))] if found.unassigned else []),
+        *([record_sheet("unassigned_eigenvalues", found.unassigned)] if found.unassigned else []),
     ]
 
 
 def locked_table(report: ArmReport, count: int = TABLED_MODES) -> Table:
-    """A row a mode: natural frequency with the hub free, and with the hub locked."""
+    """Return a row a mode: natural frequency with the hub free, and with the hub locked."""
     rows = [row for row in report.mode_list(count).modes if row.index > 0]
     return sheet("hub_locked", table(rows, ("index", "natural_frequency", "hub_locked")))
 
@@ -287,37 +287,23 @@ def locked_table(report: ArmReport, count: int = TABLED_MODES) -> Table:
 
 
 def theories(found: Mapping[Theory, Modes]) -> Table:
-    """Natural frequencies by the four beam theories, and differences from the first in per cent."""
+    """Return natural frequencies by the four beam theories, and differences from the first in per cent."""
     omega = {theory: each.natural_frequency[each.index > 0] for theory, each in found.items()}
-    differences = {theory: 100 * (omega[theory] / omega["timoshenko"] - 1) for theory in THEORIES[1:]}
-    columns = (
-        Column("mode", "mode", of=range(1, TABLED_MODES + 1)),
-        *(
-            Column(
-                f"{theory.replace('-', '_')}_rad_s",
-                theory.title(),
-                "rad/s",
-                of=each,
-                digits=column_format(8, 7),
-            )
-            for theory, each in omega.items()
-        ),
-        *(
-            Column(
-                f"{theory.replace('-', '_')}_difference_percent",
-                f"{theory.title()}, difference",
-                "%",
-                of=each,
-                digits=column_format(5, 3),
-            )
-            for theory, each in differences.items()
-        ),
-    )
+    first, *others = omega
+    differences = {theory: 100 * (omega[theory] / omega[first] - 1) for theory in others}
+    columns = [Column("mode", "mode", of=range(1, TABLED_MODES + 1))]
+    for theory, each in omega.items():
+        name = f"{theory.replace('-', '_')}_rad_s"
+        columns.append(Column(name, theory.title(), "rad/s", of=each, digits=column_format(8, 7)))
+    for theory, each in differences.items():
+        name = f"{theory.replace('-', '_')}_difference_percent"
+        label = f"{theory.title()}, difference"
+        columns.append(Column(name, label, "%", of=each, digits=column_format(5, 3)))
     return sheet("theories", columns, worst=differences["euler-bernoulli"])
 
 
 def sensitivity_table(modes: Modes) -> Table:
-    """Per cent of frequency per per cent of each parameter: a row a parameter, a column a mode."""
+    """Return per cent of frequency per per cent of each parameter: a row a parameter, a column a mode."""
     flexible = modes.index > 0
     rows = {
         name.replace("youngs", "Young's").replace("_", " "): np.round(values[flexible], SHAPE_DIGITS - 1)
@@ -350,18 +336,18 @@ def sensitivity_table(modes: Modes) -> Table:
 
 
 def tint(x: float) -> str:
-    """Orange for a rise, blue for a fall, full at 2 %/%; light enough for dark print."""
+    """Return orange for a rise, blue for a fall, full at 2 %/%; light enough for dark print."""
     strength = 0.45 * min(1.0, abs(x) / 2.0) ** 0.6
-    return "#" + "".join(
-        f"{round(255 - strength * (255 - part)):02x}" for part in ((196, 80, 10) if x > 0 else (0, 96, 168))
-    )
+    full = (196, 80, 10) if x > 0 else (0, 96, 168)
+    parts = [round(255 - strength * (255 - part)) for part in full]
+    return f"#{bytes(parts).hex()}"
 
 
 # ------------------------------------------------------------ frequency responses
 
 
 def bode_section(report: ArmReport, output: str) -> PageSection:
-    """One output: picture, its meaning, poles and zeros."""
+    """Return one output: picture, its meaning, poles and zeros."""
     data = report.bode(output)
     stem = f"bode-{output.replace('_', '-')}"
     what = f"{data.input_label} to {data.label}"
@@ -376,7 +362,9 @@ def bode_section(report: ArmReport, output: str) -> PageSection:
     roots = table([*data.pole_list, *data.zero_list], parent=data).columns
     facts = {"data": data, "boxes": boxes}
     blocks = (
-        picture("bode", frequency.bode.figure(data), stem=stem, data=curve_table(data), **bode_facts(data)),
+        picture_block(
+            "bode", frequency.bode.figure(data), stem=stem, data=curve_table(data), **bode_facts(data)
+        ),
         sheet("bode_table", roots, stem=f"{stem}-roots", **facts),
     )
     words = () if roots else (f"{prose('bode_roots', **facts)} There are none.",)
@@ -384,7 +372,7 @@ def bode_section(report: ArmReport, output: str) -> PageSection:
 
 
 def bode_facts(data: Bode) -> dict[str, Any]:
-    """The facts of a caption of a response: its zeros in the right half-plane, and the turn of its phase."""
+    """Return the facts of a caption of a response: its zeros in the right half-plane, and the turn of its phase."""
     right = data.zeros[data.zeros.real > AXIS_SHARE * abs(data.zeros)]
     count = int(np.sum(right.imag == 0) + 2 * np.sum(right.imag > 0))
     slowest = float(abs(right).min(initial=np.inf))
@@ -403,10 +391,10 @@ def fit_section(report: ArmReport, count: int = ARMS) -> PageSection:
     blocks: list[Picture | Table] = []
     if fit.responses:
         names = join_words([f"{each.label} [{each.unit}]" for each in fit.responses])
-        blocks.append(picture("fit_overlay", frequency.fitted.figure(fit), names=names))
+        blocks.append(picture_block("fit_overlay", frequency.fit_curves.figure(fit), names=names))
     blocks += [
-        sheet("fitted", table(fit.parameters), stem="fit"),
-        sheet("fit_resonances", table(fit.resonances)),
+        record_sheet("fitted", fit.parameters, stem="fit"),
+        record_sheet("fit_resonances", fit.resonances),
     ]
     try:
         possible = report.possible_arms(count)
@@ -415,14 +403,14 @@ def fit_section(report: ArmReport, count: int = ARMS) -> PageSection:
     else:
         if possible.band is not None:
             figure = frequency.draw_band.figure(fit, possible.band, "root_moment", len(possible.arms))
-            blocks.append(picture("fit_band", figure, arms=possible.arms))
+            blocks.append(picture_block("fit_band", figure, arms=possible.arms))
         if possible.share is not None:
             gains = gains_words(report.default.law)
             words.append(prose("fit_share", gains=gains, every=possible.margins))
             stable = [each.in_band for each in possible.margins if each.in_band is not None]
             columns = table(stable, ("phase_margin", "delay_margin", "disk_margin"))
             blocks += [
-                picture("fit_map", frequency.draw_share.figure(fit, possible.share)),
+                picture_block("fit_map", frequency.draw_share.figure(fit, possible.share)),
                 sheet("fit_margins", columns, gains=gains),
             ]
     answer = prose("fit", verdict=fit.verdict, found=fit.in_words)
@@ -433,7 +421,7 @@ def fit_section(report: ArmReport, count: int = ARMS) -> PageSection:
 
 
 def measured_section(report: ArmReport) -> PageSection:
-    """Each response over the exact one, with the differences."""
+    """Return each response over the exact one, with the differences."""
     blocks: list[Picture | Table] = []
     words: list[str] = []
     for number, found in enumerate(report.overlays, start=1):
@@ -443,15 +431,15 @@ def measured_section(report: ArmReport) -> PageSection:
             prose("measured_response", name=name, found=found, peaks=found.unmatched / (2 * math.pi))
         )
         blocks += [
-            picture(
+            picture_block(
                 "measured",
-                frequency.measured.figure(found),
+                frequency.measured_response.figure(found),
                 stem=f"measured{label}",
                 data=found.csv_table,
                 name=name,
             ),
-            sheet("measured_modes", table(found.modes), stem=f"measured-modes{label}"),
-            sheet("measured_required", table(found.required_changes), stem=f"measured-required{label}"),
+            record_sheet("measured_modes", found.modes, stem=f"measured-modes{label}"),
+            record_sheet("measured_required", found.required_changes, stem=f"measured-required{label}"),
         ]
     return PageSection(title="Measured over exact", words=words, blocks=blocks)
 
@@ -460,8 +448,8 @@ def measured_section(report: ArmReport) -> PageSection:
 
 
 def assumptions_section(report: ArmReport) -> PageSection:
-    """Frequencies over the sections and the hub inertias that could be chosen, with sensitivities."""
+    """Return frequencies over the sections and the hub inertias that could be chosen, with sensitivities."""
     arm = report.arm
-    blocks = [sheet(kind, table(study.candidates), study=study) for kind, study in report.candidates.items()]
+    blocks = [record_sheet(kind, study.candidates, study=study) for kind, study in report.candidates.items()]
     words = (prose("assumptions", arm=arm, has_hub=report.has_candidate_hubs),)
     return PageSection(title="Effect of the assumptions", words=words, blocks=blocks)

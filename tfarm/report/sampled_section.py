@@ -19,7 +19,16 @@ from tfarm.errors import CertificationError, ParameterError
 from tfarm.fitting.recording import RunComparison, overshoot
 from tfarm.loop.sampled_analysis import Analysis
 from tfarm.plots import animation, motion, regions, roots, style
-from tfarm.report.blocks import Fact, PageSection, Picture, columns_of, picture, prose, sheet
+from tfarm.report.blocks import (
+    Fact,
+    PageSection,
+    Picture,
+    columns_of,
+    picture_block,
+    prose,
+    record_sheet,
+    sheet,
+)
 from tfarm.report.page import ArmReport, PageCase, has_loop
 from tfarm.schema import Column, Quantity, Table, across, table, text
 from tfarm.studies.candidates import WITHOUT, TunerNumbers
@@ -66,7 +75,7 @@ def sampled_section(report: ArmReport) -> PageSection:
 
 
 def sampled_interval_facts(found: Analysis) -> Iterator[Fact]:
-    """The stability intervals of both gains of a sampled loop."""
+    """Yield the stability intervals of both gains of a sampled loop."""
     period = plain(1e3 * found.loop.chain.sampling.period)
     modes = f" (first {found.verdict.modes_used} modes)"
     for name in PLANE:
@@ -77,12 +86,12 @@ def sampled_interval_facts(found: Analysis) -> Iterator[Fact]:
 
 
 def chain_words(arm: Arm, chain: Chain) -> str:
-    """Every part of the chain that is not ideal."""
+    """Return every part of the chain that is not ideal."""
     return prose("chain", chain=chain, unit=arm.input_unit, is_default=chain == Chain())
 
 
 def _stem(name: str, each: PageCase) -> str:
-    """The name of a controller's table; the first has no more than the name."""
+    """Return the name of a controller's table; the first has no more than the name."""
     if each.key in ("default", "law"):
         return f"sampled-{name}"
     return f"sampled-{name}-{each.key.replace('_', '-')}"
@@ -107,9 +116,9 @@ def overlay_picture(report: ArmReport, found: Analysis) -> Picture:
     """Return the regions of the continuous and of the sampled loop in one plane, with the intervals of K2 below it."""
     both = report.regions
     rows = [row for row in report.cases[0].margins.stability_intervals if row.name == MOMENT_GAIN]
-    return picture(
+    return picture_block(
         "sampled_overlay",
-        regions.overlay.figure(*both),
+        regions.gain_regions.figure(*both),
         data=both.columns,
         arm=report.arm,
         low=float(both.continuous.x[0]),
@@ -130,7 +139,7 @@ def loci_picture(report: ArmReport, found: Analysis) -> Picture:
             gains = [own.number(each) for each in PLANE]
             upper = [(mode, z) for mode, z in zip(locus.mode.tolist(), poles, strict=True) if not z.imag < 0]
             rows += [(name, *gains, mode, z.real, z.imag) for mode, z in upper]
-    return picture(
+    return picture_block(
         "sampled_loci",
         roots.draw_sampled_loci.figure(loci),
         data=columns_of(("locus", *PLANE, "mode", "real", "imaginary"), rows),
@@ -181,7 +190,9 @@ def slews(report: ArmReport) -> tuple[list[Picture | Table], list[str], list[Fac
     own = [each for each in simulated if each.key != "without"]
     moving = next((each for each in own if runs[each.name].stopped is None), None)
     blocks: list[Picture | Table] = [
-        picture("sampled_slew", figure, data=columns, runs=runs, piece=piece_of_bands(runs), task=title),
+        picture_block(
+            "sampled_slew", figure, data=columns, runs=runs, piece=piece_of_bands(runs), task=title
+        ),
         sheet("slew_numbers", numbers, stem="sampled-slew-numbers"),
     ]
     facts = [settling_fact(each, runs[each.name], len(report.laws) > 1) for each in own]
@@ -194,7 +205,7 @@ def slews(report: ArmReport) -> tuple[list[Picture | Table], list[str], list[Fac
 
 
 def tip_facts(found: Step) -> Iterator[Fact]:
-    """The settling time of the tip in each loop, from the end of the slew, and its residual vibration."""
+    """Yield the settling time of the tip in each loop, from the end of the slew, and its residual vibration."""
     for name, loop in found.loops.items():
         label = f"settling time of the tip after the slew, {name.partition(',')[0]}"
         if loop.tip is None or loop.tip.settling_time is None:
@@ -207,12 +218,12 @@ def tip_facts(found: Step) -> Iterator[Fact]:
 def film_picture(each: PageCase, run: Simulation) -> Picture:
     """Return the film of a slew, and of what follows for half as long."""
     found = each.film(run)
-    still = picture("slew_film", animation.draw_motion.figure(found), name=each.name, found=found)
+    still = picture_block("slew_film", animation.draw_motion.figure(found), name=each.name, found=found)
     return still._replace(film=animation.film(found).gif)
 
 
 def settling_fact(each: PageCase, run: Simulation, is_named: bool) -> Fact:
-    """The settling time of a slew, or the time within which it is not reached."""
+    """Return the settling time of a slew, or the time within which it is not reached."""
     label = f"settling time of the root moment{f', {each.name}' if is_named else ''}"
     if run.stopped is not None:
         return Fact(label, "unstable")
@@ -222,13 +233,13 @@ def settling_fact(each: PageCase, run: Simulation, is_named: bool) -> Fact:
 
 
 def piece_of_bands(runs: Mapping[str, Simulation]) -> float | None:
-    """The time [s] that each piece of a curve spans that is drawn as a band; None where all are lines."""
+    """Return the time [s] that each piece of a curve spans that is drawn as a band; None where all are lines."""
     curves = (traces.curve_of(run, "root_moment") for run in runs.values())
     return next((float(one.t[1] - one.t[0]) for one in curves if one.is_band), None)
 
 
 def response_columns(arm: Arm, each: Mapping[str, Simulation]) -> Sequence[Column]:
-    """The curves of some simulations of one scenario as they are drawn: a row a point, or a piece of the bands.
+    """Return the curves of some simulations of one scenario as they are drawn: a row a point, or a piece of the bands.
 
     Torques are those held at that time, the rigid arm's moment that of the sample after it.
     """
@@ -274,7 +285,7 @@ class StepRow(NamedTuple):
 
 
 def step_rows(name: str, found: RunComparison) -> Iterator[StepRow]:
-    """The measured step, and the computed one."""
+    """Yield the measured step, and the computed one."""
     step = found.measured.step
     end = float(found.measured.reference[-1])
     for origin, angle in (("measured", found.measured.hub_angle), ("computed", found.hub_angle)):
@@ -282,15 +293,17 @@ def step_rows(name: str, found: RunComparison) -> Iterator[StepRow]:
 
 
 def measured_blocks(report: ArmReport) -> Iterator[Picture | Table]:
-    """Each measured run with the exact loop over it, and both in numbers; nothing where none was measured."""
+    """Yield each measured run with the exact loop over it, and both in numbers; nothing where none was measured."""
     runs = {each: run for each in report.cases if (run := each.run) is not None}
     if not runs:
         return
     found = {each.name: run for each, run in runs.items()}
     columns = compared_data({each.key: run for each, run in runs.items()})
-    yield picture("sampled_measured", motion.draw_measured_runs.figure(found), data=columns, found=found)
+    yield picture_block(
+        "sampled_measured", motion.draw_measured_runs.figure(found), data=columns, found=found
+    )
     rows = [row for name, it in found.items() if it.measured.hub_angle.size for row in step_rows(name, it)]
-    yield sheet("sampled_overshoot", table(rows))
+    yield record_sheet("sampled_overshoot", rows)
 
 
 def growth_words(each: PageCase, found: Analysis) -> str:
@@ -306,7 +319,7 @@ def growth_words(each: PageCase, found: Analysis) -> str:
 
 
 def compared_data(found: Mapping[str, RunComparison]) -> Iterator[Column]:
-    """The curves of the picture: a row a sample, measured values taken between their rows."""
+    """Yield the curves of the picture: a row a sample, measured values taken between their rows."""
     t = min((it.run.t for it in found.values()), key=len)
     yield Column("t_s", of=t)
     for key, it in found.items():
@@ -410,7 +423,9 @@ def tuner_blocks(data: TunerNumbers, both: StableRegions) -> Iterator[Picture | 
     result = tuning.training.result
     columns = Column("t_s", of=result.t), Column("K", of=result.K), Column("x_N_m", of=result.x)
     gain = tuning.constant.gain_text(RATE_GAIN, plain)
-    yield picture("tune_gain", motion.draw_gain.figure(tuning, *both), data=columns, tuning=tuning, gain=gain)
+    yield picture_block(
+        "tune_gain", motion.draw_gain.figure(tuning, *both), data=columns, tuning=tuning, gain=gain
+    )
     chain = chain_words(data.arm, data.coarse[WITHOUT].chain)
     for kind, runs, how in (
         ("tune_slew", data.slews, "ideal converters"),
@@ -418,10 +433,14 @@ def tuner_blocks(data: TunerNumbers, both: StableRegions) -> Iterator[Picture | 
     ):
         figure = motion.slew.figure(data.arm, runs, f"the slew, {how}")
         slews = response_columns(data.arm, dict(zip(("without", "tuner"), runs.values(), strict=True)))
-        yield picture(kind, figure, data=slews, runs=runs, piece=piece_of_bands(runs), how=how, chain=chain)
-    yield sheet("tune_comparison", table(data.rows), data=data)
+        yield picture_block(
+            kind, figure, data=slews, runs=runs, piece=piece_of_bands(runs), how=how, chain=chain
+        )
+    yield record_sheet("tune_comparison", data.rows, data=data)
     curves = data.curves
     learned = [Column("trial", of=range(1, curves.costs.shape[1] + 1))]
     learned += [Column(name, of=costs) for name, costs in curves.quartile_curves.items()]
     learned += [Column(f"seed_{seed}", of=costs) for seed, costs in enumerate(curves.costs)]
-    yield picture("tune_curves", motion.draw_curves.figure(curves, tuning), data=learned, curves=curves)
+    yield picture_block(
+        "tune_curves", motion.draw_learning.figure(curves, tuning), data=learned, curves=curves
+    )

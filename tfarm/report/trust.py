@@ -34,6 +34,7 @@ from tfarm.report.blocks import (
     argument,
     keep,
     read_records,
+    record_sheet,
     render,
     save_section,
     sheet,
@@ -52,7 +53,7 @@ def save_proof(report: ArmReport, folder: Path) -> None:
 
 
 def written_proofs(out: Path) -> Sequence[ArmProof]:
-    """The proofs of all arms in the folder of reports, by name; what is none of ours is passed over."""
+    """Return the proofs of all arms in the folder of reports, by name; what is none of ours is passed over."""
     return list(read_records(out, "proof", ArmProof).values())
 
 
@@ -80,7 +81,7 @@ def proof_tables(proofs: Sequence[ArmProof]) -> list[Table]:
             "counts", table(proofs, ("name", "has_rigid_mode", "enclosed", "count", "count_below", "verdict"))
         ),
         sheet("digits", columns, modes=PROVEN_MODES, digits=BRACKET_DIGITS),
-        sheet("boxes", table([each for proof in proofs for each in proof.boxes]), digits=PROVEN_DIGITS),
+        record_sheet("boxes", [each for proof in proofs for each in proof.boxes], digits=PROVEN_DIGITS),
     ]
 
 
@@ -90,8 +91,8 @@ def published_tables(found: published.Validation) -> list[Table]:
     counts = Column("numbers", "numbers", of=map(len, agrees)), Column("agree", "agree", of=map(sum, agrees))
     return [
         sheet("sources", (*table(found.sources).columns, *counts)),
-        sheet("differences", table(found.differences)),
-        sheet("published", table(found.rows)),
+        record_sheet("differences", found.differences),
+        record_sheet("published", found.rows),
     ]
 
 
@@ -99,7 +100,7 @@ TRUST_FOLDER = "trust"
 
 
 def in_letters(text: str) -> Markup:
-    """The audit's plain text with Greek letters, subscripts and exponents: theta_t^2 becomes θ<sub>t</sub>²."""
+    """Return the audit's plain text with Greek letters, subscripts and exponents: theta_t^2 becomes θ<sub>t</sub>²."""
     greek = LETTER.sub(lambda name: GREEK[name[1]], powers(unit(str(escape(text)))))
     return Markup(
         re.sub(
@@ -109,8 +110,8 @@ def in_letters(text: str) -> Markup:
 
 
 def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[Markup]]:
-    """Both as MathML, a line each, the symbols in which they differ of the class "changed"."""
-    both = [*_set(printed)], [*_set(corrected)]
+    """Return both as MathML, a line each, the symbols in which they differ of the class "changed"."""
+    both = [*_formula_lines(printed)], [*_formula_lines(corrected)]
     a, b = (
         [leaf for line in each for leaf in line.iter() if leaf.tag in ("mi", "mo", "mn", "mtext")]
         for each in both
@@ -123,8 +124,8 @@ def compared_formulas(printed: str, corrected: str) -> tuple[list[Markup], list[
     return left, right
 
 
-def _set(tex: str) -> Iterator[ElementTree.Element]:
-    """A formula a line, without the name space that a file of XML would need and a page of HTML does not."""
+def _formula_lines(tex: str) -> Iterator[ElementTree.Element]:
+    """Yield a formula a line, without the name space that a file of XML would need and a page of HTML does not."""
     for line in re.split(r"(?<=[,;])\\quad\s*", tex):
         # a single letter would be slanted
         upright = re.sub(r"\\mathrm\{(\w)\}", r"\\text{\1}", line.strip())

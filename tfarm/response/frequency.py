@@ -7,34 +7,29 @@ nearest point is at a millionth of w.
 The phase.  At C = 0 the response is real, and its phase is counted: 180 degrees down at every pole on the axis and up
 at every zero on it, the limit of vanishing damping.  Elsewhere the phase of the refined grid changes by far less than
 180 degrees between two points, and is unwrapped.
-
-Peaks and dips are local maxima and minima of |G(i omega)|.  A damped pole with a small residue may have no peak.  The
-slope of ln |G| may vanish where it changes, from one interval to the next, by more than its size.  Such intervals are
-halved until no extremum above rounding fits in them.  A parabola through three points then gives the frequency.
 """
 
-import itertools
 import math
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import field
 from fractions import Fraction
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tfarm.arm import Arm
-from tfarm.arrays import Complex, Real, Whole
+from tfarm.arrays import Complex, Real
 from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.exact.outputs import Output, unit_over
 from tfarm.exact.rigid import rigid_response
 from tfarm.records import frozen
+from tfarm.response.extrema import Extremum, extrema
 from tfarm.response.transfer import TransferFunction, transfer
 from tfarm.schema import Quantity
 from tfarm.spectrum import modes
 
-# of the error, even in ln w
+# of the largest error, even in ln w
 BAND_POINTS = 100
 
 
@@ -61,27 +56,8 @@ def worst_error(arm: Arm, output: str, band: tuple[float, float]) -> float | Non
 
 # rad/s
 HERTZ = 2 * math.pi
-# relative width below which no interval is halved
-NARROWEST = 4 * float(np.finfo(float).eps)
-
-ResponseFunction = Callable[[Complex], Any]
-
-
-class Extremum(NamedTuple):
-    """A local maximum or minimum of |G(i omega)|: angular frequency [rad/s], and |G| in the response's unit.
-
-    `magnitude` is inf at a pole on the imaginary axis and 0 at a zero on it.
-    """
-
-    omega: Annotated[float, Quantity("angular frequency", "rad/s", 7, "frequency of the extremum")]
-    magnitude: Annotated[
-        float, Quantity("magnitude", help="|G|; inf or 0 at a root on the axis", unit_of="gain_unit")
-    ]
-
-    @property
-    def frequency(self) -> Annotated[float, Quantity("frequency", "Hz", 7, "angular frequency over 2 pi")]:
-        """In Hz."""
-        return self.omega / HERTZ
+# |Re s|/|s| below which a root is on the imaginary axis
+AXIS_SHARE = 1e-12
 
 
 class Root(NamedTuple):
@@ -94,91 +70,6 @@ class Root(NamedTuple):
     magnitude: Annotated[
         float, Quantity("magnitude", help="|G| at i Im s, or i |s| if real", unit_of="gain_unit")
     ]
-
-
-def extrema(
-    G: ResponseFunction, omega: Real, value: Complex, roots: Complex, infinite: Real, vanishing: Real
-) -> tuple[tuple[Extremum, ...], tuple[Extremum, ...]]:
-    """Return peaks and dips between the ends of a grid omega [rad/s] (ascending) that resolves poles and zeros.
-
-    `value` is G on the grid, `roots` [1/s] are poles and zeros near it, `infinite` and `vanishing` [rad/s] the
-    frequencies of those on the imaginary axis, which are not in the grid.
-    """
-    # half a second to import
-    from scipy.signal import find_peaks
-
-    on_axis = np.sort(np.r_[infinite, vanishing])
-    # two roots may have no point of the grid between them
-    between = (on_axis[:-1] + on_axis[1:]) / 2
-    at = np.r_[omega, between, infinite, vanishing]
-    with np.errstate(divide="ignore"):
-        limits = np.repeat([np.inf, -np.inf], [infinite.size, vanishing.size])
-        height = np.r_[np.log(abs(value)), _height(G, between), limits]
-    order = np.argsort(at)
-    at, height = _halved(G, at[order], height[order], roots)
-    least = _least(at, roots)
-    maxima, minima = (find_peaks(sign * height, prominence=least)[0] for sign in (1, -1))
-    return _refined(G, at, height, maxima), _refined(G, at, height, minima)
-
-
-def _height(G: ResponseFunction, omega: Real) -> Real:
-    """Return ln |G(i omega)|."""
-    return np.log(abs(G(1j * omega)))
-
-
-def _least(omega: Real, roots: Complex) -> Real:
-    """Return the least rise and fall of ln |G| at a peak, at each frequency."""
-    distance = abs(1j * omega[:, None] - roots).min(axis=1, initial=np.inf)
-    # of |G|: 1e-9 above rounding, and its own error, 1e-14 over |s/(s - p)| of the nearest pole or zero p
-    return 1e-9 + 1e-14 * omega / np.maximum(distance, NARROWEST * omega)
-
-
-def _halved(G: ResponseFunction, omega: Real, height: Real, roots: Complex) -> tuple[Real, Real]:
-    """Return the grid with more points where the slope of ln |G| may vanish between two of its points."""
-    # 40 halvings of an interval: to the spacing of float64 numbers
-    for _ in range(40):
-        with np.errstate(invalid="ignore"):
-            slope = np.diff(height) / np.diff(omega)
-            change = abs(np.diff(slope))
-        # next to a root on the axis the slope is steep
-        change[~np.isfinite(change)] = 0.0
-        near = np.maximum(np.r_[0.0, change], np.r_[change, 0.0])
-        found = np.flatnonzero(abs(slope) <= near)
-        left = omega[found]
-        width = omega[found + 1] - left
-        hidden = near[found] * width > _least(left, roots)
-        found = found[hidden & (width > NARROWEST * omega[found + 1])]
-        if not found.size:
-            break
-        middle = (omega[found] + omega[found + 1]) / 2
-        omega = np.insert(omega, found + 1, middle)
-        height = np.insert(height, found + 1, _height(G, middle))
-    return omega, height
-
-
-def _refined(G: ResponseFunction, omega: Real, height: Real, places: Whole) -> tuple[Extremum, ...]:
-    """Return the extrema near these indices, finite ones at the vertex of a parabola through three points."""
-    at = places[np.isfinite(height[places])]
-    middle = (omega[1:] + omega[:-1]) / 2
-    with np.errstate(invalid="ignore", divide="ignore"):
-        slope = np.diff(height) / np.diff(omega)
-        vertex = middle[at - 1] + (middle[at] - middle[at - 1]) * slope[at - 1] / (slope[at - 1] - slope[at])
-    vertex = np.where(np.isfinite(vertex), np.clip(vertex, omega[at - 1], omega[at + 1]), omega[at])
-    finite = dict(
-        zip(at.tolist(), zip(vertex.tolist(), abs(G(1j * vertex)).tolist(), strict=True), strict=True)
-    )
-    limit = {np.inf: np.inf, -np.inf: 0.0}
-    return tuple(
-        Extremum(*finite.get(i) or (float(omega[i]), limit[float(height[i])])) for i in places.tolist()
-    )
-
-
-# points of the even grid
-EVEN_PER_DECADE = 120
-# relative distance of the nearest point to a root on the axis
-NEAREST = 1e-6
-# |Re s|/|s| below which a root is on the imaginary axis
-AXIS_SHARE = 1e-12
 
 
 @frozen(slots=True, kw_only=True)
@@ -255,7 +146,7 @@ class Bode:
         self,
     ) -> Annotated[list[Root], Quantity("poles", help="not cancelled, without 0", key="poles")]:
         """The poles of the upper half-plane."""
-        return list(map(self._root, itertools.repeat("pole"), self.poles.tolist(), self.at_poles.tolist()))
+        return _listed_roots("pole", self.poles, self.at_poles)
 
     @property
     def zero_list(
@@ -266,10 +157,7 @@ class Bode:
         if self.arm.has_elastic_link:
             # 1e-13 of |s|: rounding of Re s of a zero on the axis, for an elastic link
             zeros = np.where(abs(zeros.real) < 1e-13 * abs(zeros), 1j * zeros.imag, zeros)
-        return list(map(self._root, itertools.repeat("zero"), zeros.tolist(), self.at_zeros.tolist()))
-
-    def _root(self, kind: str, s: complex, size: float) -> Root:
-        return Root(kind, s, s.imag / HERTZ, -s.real / abs(s) + 0.0 if s else None, size)
+        return _listed_roots("zero", zeros, self.at_zeros)
 
     @property
     def finding(
@@ -328,6 +216,16 @@ class Bode:
         if self.input == "hub_torque":
             return "torque"
         return self.input.replace("_", " ")
+
+
+def _listed_roots(kind: str, roots: Complex, magnitudes: Real) -> list[Root]:
+    """Return the poles or zeros of a Bode plot with |G| at each."""
+    found = []
+    for s, magnitude in zip(roots.tolist(), magnitudes.tolist(), strict=True):
+        # -0.0 becomes 0.0
+        damping = -s.real / abs(s) + 0.0 if s else None
+        found.append(Root(kind, s, s.imag / HERTZ, damping, magnitude))
+    return found
 
 
 def resonant_band(arm: Arm, resonances: int = 10) -> tuple[float, float]:
@@ -416,7 +314,7 @@ def known_band(band: tuple[float, float], widest: float) -> tuple[float, float]:
 def _no_motion(arm: Arm, row: Output, x: float | None, band: tuple[float, float]) -> Bode:
     zero = np.zeros(2, complex)
     none = zero[:0]
-    everywhere = -math.inf, math.inf
+    everywhere = (-math.inf, math.inf)
     return Bode(
         arm=arm,
         row=row,
@@ -442,31 +340,36 @@ def without_cancelled(poles: Complex, zeros: Complex) -> tuple[Complex, Complex]
     kept_zeros = list(zeros)
     for pole in poles:
         # 1e-9: relative distance below which a pole and a zero cancel
-        for zero in [zero for zero in kept_zeros if abs(zero - pole) <= 1e-9 * abs(pole)][:1]:
+        near = [zero for zero in kept_zeros if abs(zero - pole) <= 1e-9 * abs(pole)]
+        if near:
             kept_poles.remove(pole)
-            kept_zeros.remove(zero)
+            kept_zeros.remove(near[0])
     return np.array(kept_poles, complex), np.array(kept_zeros, complex)
 
 
 def refined_grid(band: tuple[float, float], roots: Complex) -> Real:
     """Return frequencies [rad/s], ascending, even on a log scale and geometric around every root off the real axis."""
+    even_per_decade = 120
+    # relative distance of the nearest point to a root on the axis
+    least_gap = 1e-6
     low, high = band
-    even = np.geomspace(low, high, 1 + math.ceil(EVEN_PER_DECADE * math.log10(high / low)))
-    grid = np.unique(np.r_[even, *(_around(root) for root in roots if root.imag > 0)])
+    even = np.geomspace(low, high, 1 + math.ceil(even_per_decade * math.log10(high / low)))
+    near = (_root_grid(root, least_gap, even_per_decade) for root in roots.tolist() if root.imag > 0)
+    grid = np.unique(np.r_[even, *near])
     on_axis = _on_axis(roots)
     # none so near to a root that the value is rounding
     if on_axis.size:
         gap = abs(grid[:, None] / on_axis - 1).min(axis=1)
-        grid = grid[gap >= 0.5 * NEAREST]
+        grid = grid[gap >= 0.5 * least_gap]
     return grid[(grid >= low) & (grid <= high)]
 
 
-def _around(root: complex) -> Real:
-    """Return w and w +- sigma t, up to two steps of the even grid."""
+def _root_grid(root: complex, least_gap: float, even_per_decade: int) -> Real:
+    """Return w and w +- sigma t of a root, up to two steps of the even grid; on the axis t begins at `least_gap` w."""
     centre = root.imag
-    reach = 2 * centre * math.log(10) / EVEN_PER_DECADE
+    reach = 2 * centre * math.log(10) / even_per_decade
     on_axis = abs(root.real) <= AXIS_SHARE * abs(root)
-    nearest = NEAREST * centre if on_axis else abs(root.real) / 20
+    nearest = least_gap * centre if on_axis else abs(root.real) / 20
     if nearest >= reach:
         return np.array([centre])
     # 12 points for each decade of distance, on each side of a pole or zero
@@ -486,10 +389,10 @@ def phase_of(omega: Real, value: Complex, poles: Complex, zeros: Complex, *, is_
     if not is_real:
         phase = np.degrees(np.unwrap(np.angle(value)))
         return phase - 360.0 * np.round((phase[0] - start) / 360.0)
-    passed = (np.searchsorted(np.sort(_on_axis(roots)), omega) for roots in (zeros, poles))
+    zeros_below, poles_below = (np.searchsorted(np.sort(_on_axis(roots)), omega) for roots in (zeros, poles))
     if abs(first.imag) > abs(first.real):
         start = 90.0 if first.imag > 0 else -90.0
-    return start + 180.0 * np.subtract(*passed)
+    return start + 180.0 * np.subtract(zeros_below, poles_below)
 
 
 def _is_on_axis(roots: Complex) -> NDArray[np.bool_]:

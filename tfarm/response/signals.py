@@ -36,17 +36,17 @@ class Signals:
     names: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        require(self._placed, "signals", [], "name at least one output")
+        require(self._places_by_output, "signals", [], "name at least one output")
 
     @property
     def outputs(self) -> tuple[Output, ...]:
         """The output of each signal."""
-        return tuple(wanted for wanted, _ in self._placed)
+        return tuple(wanted for wanted, _ in self._places_by_output)
 
     @cached_property
     def places(self) -> tuple[float, ...]:
         """The place of each as a share of the length; 0 for outputs with a fixed place."""
-        return tuple(place / self.arm.length for _, place in self._placed)
+        return tuple(place / self.arm.length for _, place in self._places_by_output)
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -59,19 +59,18 @@ class Signals:
         return system_of(self.arm)
 
     def kept(self, s: Complex) -> LoopParts:
-        """Return `parts`, cached for the last sets of points."""
+        """Return `parts`, cached for the last 24 sets of points."""
         key = (s.shape, s.tobytes())
-        kept = self._kept
-        found = kept.pop(key, None) or read_only(self.parts(s))
+        cache = self._cache
+        found = cache.pop(key, None) or read_only(self.parts(s))
         # the last one is the latest
-        kept[key] = found
-        # 24: sets of points whose values are cached
-        if len(kept) > 24:
-            del kept[next(iter(kept))]
+        cache[key] = found
+        if len(cache) > 24:
+            del cache[next(iter(cache))]
         return found
 
     @cached_property
-    def _kept(self) -> dict[Any, LoopParts]:
+    def _cache(self) -> dict[Any, LoopParts]:
         return {}
 
     def parts(self, s: NDArray[Any]) -> LoopParts:
@@ -99,13 +98,11 @@ class Signals:
     @cached_property
     def orders(self) -> tuple[int, ...]:
         """The order of each numerator's zero at s = 0; that of the drive is `system.at_rest`."""
-        return tuple(
-            order_at_zero(self.system, wanted, share)
-            for wanted, share in zip(self.outputs, self.places, strict=True)
-        )
+        pairs = zip(self.outputs, self.places, strict=True)
+        return tuple(order_at_zero(self.system, wanted, share) for wanted, share in pairs)
 
     @cached_property
-    def _placed(self) -> tuple[tuple[Output, float], ...]:
+    def _places_by_output(self) -> tuple[tuple[Output, float], ...]:
         """The output of each name and its place [m]."""
         return tuple(locate_output(name, self.arm.length) for name in self.names)
 
@@ -182,6 +179,6 @@ def sign_of(arm: Arm) -> str:
         return f"{words}; a static torque u gives the moment -(J - I_h)/J u"
     if not arm.has_rigid_mode:
         return f"{words}; u is {input_words(arm)}"
-    share = arm.gauged_inertia / arm.total_inertia
-    at_rest = f"a static torque at the hub gives the moment {-share:.6g} times as much"
+    share = -arm.gauged_inertia / arm.total_inertia
+    at_rest = f"a static torque at the hub gives the moment {share:.6g} times as much"
     return f"{words}; u is {input_words(arm)}, and {at_rest}"

@@ -70,7 +70,7 @@ def zeros_of(arm: Arm, wanted: Output, up_to: float, x: float) -> Roots:
     constant = constant_of(k, wanted, share)
     if constant is not None:
         at_zero = wanted.power if constant else 0
-        return Roots(np.zeros(at_zero, complex), (-math.inf, math.inf, -up_to, up_to), "constant")
+        return replace(_on_axis(np.empty(0), at_zero, up_to), proof="constant")
     base = replace(wanted.base, gauge=False)
     order = order_at_zero(k, base, x)
     at_zero = max(0, order + wanted.power - k.at_rest)
@@ -95,9 +95,8 @@ def _on_axis(frequencies: NDArray[np.float64], at_zero: int, up_to: float) -> Ro
 
 def _near_poles(arm: Arm, up_to: float) -> Complex:
     """Return estimates of an arm's poles, and real starts."""
-    return np.r_[
-        damped_starts(arm, flexible_frequencies(arm, 1.5 * up_to)), np.linspace(-up_to, -up_to / 50, 40)
-    ]
+    starts = damped_starts(arm, flexible_frequencies(arm, 1.5 * up_to))
+    return np.r_[starts, np.linspace(-up_to, -up_to / 50, 40)]
 
 
 def _starts_by_sampling(size_at: Callable[[Complex], Real], up_to: float) -> Complex:
@@ -106,8 +105,9 @@ def _starts_by_sampling(size_at: Callable[[Complex], Real], up_to: float) -> Com
     starts = []
     for direction in (1j, 1.0, -1.0):
         size = size_at(direction * line)
-        dips = np.nonzero((size[1:-1] < size[:-2]) & (size[1:-1] < size[2:]))[0] + 1
-        starts.append(direction * line[dips])
+        inner = size[1:-1]
+        is_dip = (inner < size[:-2]) & (inner < size[2:])
+        starts.append(direction * line[1:-1][is_dip])
     found = np.concatenate(starts)
     return np.r_[found, found.conj(), -found, -found.conj()]
 
@@ -127,22 +127,20 @@ def _in_box(k: System, function: Function, at_zero: int, up_to: float, starts: C
     """Return the zeros of a function in a box of that height; the box grows where a zero lies on its edge."""
 
     def box_of(height: float) -> Box:
-        return Box(
-            -min(TOWARD_SINGULAR / k.damping, height) if k.damping else -height, height, -height, height
-        )
+        reach = min(TOWARD_SINGULAR / k.damping, height) if k.damping else height
+        return Box(-reach, height, -height, height)
 
     found, box = complete_zeros(function, box_of, up_to, starts)
     # zeros come in +- pairs too
     if k.is_undamped:
         found = np.where(abs(found.real) < REAL_SHARE * abs(found), 1j * found.imag, found)
-    found = found[np.lexsort((-found.imag, found.real.round(9), abs(found.imag).round(9)))]
+    order = np.lexsort((-found.imag, found.real.round(9), abs(found.imag).round(9)))
+    found = found[order]
     return Roots(np.r_[np.zeros(at_zero, complex), found], (*box,), "winding number")
 
 
 if TYPE_CHECKING:
     import control
-
-A_FREQUENCY = "a positive, finite frequency in rad/s"
 
 
 # one output or several
@@ -239,7 +237,7 @@ class TransferFunction:
     def __call__(self, s: ArrayLike) -> Any:
         """Return G(s) at a complex scalar or array."""
         points = _finite(s)
-        return self._shaped(self._values(points.ravel()).reshape(len(self.outputs), *points.shape))
+        return self._as_single(self._values(points.ravel()).reshape(len(self.outputs), *points.shape))
 
     def by_methods(self, s: ArrayLike) -> ByMethod:
         """Return G(s) at an array of s by every method that has it (`tfarm.exact.values`), with their differences."""
@@ -257,7 +255,7 @@ class TransferFunction:
         self.must_be_of_the_hub("a derivative")
         points = _finite(s)
         flat = differentiate_outputs(self.system, self.rows, points.ravel(), self.share)
-        return self._shaped(flat.reshape(len(self.outputs), *points.shape))
+        return self._as_single(flat.reshape(len(self.outputs), *points.shape))
 
     def digits(self, s: complex, digits: int) -> Any:
         """Return G(s) as pairs of decimal strings (re, im), each with that many digits certified in ball arithmetic.
@@ -294,9 +292,10 @@ class TransferFunction:
         blocks = np.array_split(s, 1 + (s.size >> 13))
         return np.hstack([evaluate_outputs(self.system, self.rows, each, self.share) for each in blocks])
 
-    def _shaped(self, values: NDArray[Any]) -> Any:
+    def _as_single(self, values: NDArray[Any]) -> Any:
         """Return values (outputs, ...) without the first axis for a single output, a scalar as a Python number."""
-        values = values[0] if self.is_single else values
+        if self.is_single:
+            values = values[0]
         return values if np.ndim(values) else values.item()
 
     # ------------------------------------------------------------ s = 0, poles and zeros
@@ -310,12 +309,12 @@ class TransferFunction:
     @property
     def rigid_body(self) -> Any:
         """The coefficient of 1/s^2 at s = 0, of the rigid body."""
-        return self._shaped(self.expansion[:, 0])
+        return self._as_single(self.expansion[:, 0])
 
     @property
     def static(self) -> Any:
         """The constant term of the expansion at s = 0: the static gain where the output is finite there."""
-        return self._shaped(self.expansion[:, 2])
+        return self._as_single(self.expansion[:, 2])
 
     def poles(self, *, up_to: float) -> Roots:
         """Return the poles with |Im s| <= up_to [rad/s], complete in the box of the record (see `Roots`).
@@ -324,7 +323,7 @@ class TransferFunction:
         mode.  At C > 0 they are complete by the winding number of the characteristic function.
         """
         k = self.system
-        up_to = positive("up_to", up_to, A_FREQUENCY)
+        up_to = _known_height(up_to)
         if self.arm.is_undamped:
             return _on_axis(flexible_frequencies(self.arm, up_to), k.at_rest, up_to)
         starts = _near_poles(self.arm, up_to)
@@ -337,7 +336,7 @@ class TransferFunction:
         """
         self.must_be_of_the_hub("zeros")
         require(self.is_single, "outputs", self.outputs, "zeros are those of one output; give one")
-        return zeros_of(self.arm, self.rows[0], positive("up_to", up_to, A_FREQUENCY), self.share)
+        return zeros_of(self.arm, self.rows[0], _known_height(up_to), self.share)
 
     # ------------------------------------------------------------ inside
 
@@ -352,7 +351,13 @@ class TransferFunction:
         return 0.0 if self.x is None else self.x / self.arm.length
 
 
+def _known_height(up_to: float) -> float:
+    """Return the height of a box.  Raises ParameterError for another value."""
+    return positive("up_to", up_to, "a positive, finite frequency in rad/s")
+
+
 def _finite(s: ArrayLike) -> Complex:
+    """Return the points s [1/s] as an array.  Raises ParameterError for NaN and beyond 1e20."""
     points = np.asarray(s, dtype=complex)
     # without an array of a million sizes
     ends = [end(part, initial=0.0) for part in (points.real, points.imag) for end in (np.min, np.max)]
@@ -411,14 +416,14 @@ class TransferPoints:
         """A row for each point."""
         first = roots_table(self.s, Quantity("s", "1 / s", 12)).columns
         value = self.value
-        pairs: Iterable[Any]
+        parts: Iterable[Any]
         if isinstance(value, list):
-            pairs = zip(*value, strict=True)
+            parts = zip(*value, strict=True)
         else:
-            pairs = (value.real.tolist(), value.imag.tolist())
+            parts = value.real, value.imag
         values = (
-            Column(f"{part}_{self.output}", f"{part} {self.output}", self.gain_unit, of=list(of))
-            for part, of in zip(("re", "im"), pairs, strict=True)
+            Column(f"{part}_{self.output}", f"{part} {self.output}", self.gain_unit, of=of)
+            for part, of in zip(("re", "im"), parts, strict=True)
         )
         names = (Column(f"{each.key}_s", each.title, "1/s", of=each.of, shown=each.shown) for each in first)
         return Table(columns=(*names, *values))
@@ -431,7 +436,7 @@ def values_at(G: TransferFunction, s: Complex, digits: int | None = None) -> Tra
     if right <= DOUBLE_DIGITS:
         value = np.asarray(G(s))
     else:
-        value = [list(G.digits(complex(each), right)) for each in s]
+        value = [list(G.digits(each, right)) for each in s.tolist()]
     return TransferPoints(
         s, value, G.arm.name, G.input, G.input_unit, G.outputs[0], G.units[0], G.x, G.method
     )

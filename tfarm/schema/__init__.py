@@ -5,8 +5,14 @@
         delay: Annotated[float, Quantity("delay margin", "s", 4, "smallest further delay that destabilises the loop")]
 
 JSON, CSV, terminals, pages, axes, the documentation and the comparison of two records have its name, unit, digits and
-meaning from here.  `to_dict` and `sections` read a record, `table` records of one class, `compare_records` two of them;
-`schema.terminal` and `schema.html` render tables, `schema.glossary` has every declared quantity.
+meaning from here.
+
+quantities  Quantity, values of a record in JSON and as text, two records compared
+tables      tables and sections of records, as JSON and CSV
+terminal    records and tables on a terminal
+html        tables on a page
+printed     records that print as their table
+glossary    words of certainty, terms and every declared quantity
 """
 
 from tfarm.moved import moved

@@ -35,13 +35,18 @@ class Declared:
     meaning: Annotated[str, Quantity("meaning", help="definition, with its sign or limit convention")]
 
 
-_FILE = tomllib.loads((Path(__file__).parent / "terms.toml").read_text(encoding="utf-8"))
-CERTAINTY, TERMS = (tuple(Term(**entry) for entry in _FILE[kind]) for kind in ("certainty", "terms"))
-GLOSSARY_TERMS = tuple(sorted((*CERTAINTY, *TERMS), key=lambda term: term.name.casefold()))
+def _read_terms(kind: str) -> tuple[Term, ...]:
+    """Return the terms of a kind, certainty or terms, in the file `terms.toml`."""
+    tables = tomllib.loads(Path(__file__).with_name("terms.toml").read_text(encoding="utf-8"))
+    return tuple(Term(**entry) for entry in tables[kind])
+
+
+CERTAINTY = _read_terms("certainty")
+GLOSSARY_TERMS = tuple(sorted((*CERTAINTY, *_read_terms("terms")), key=lambda term: term.name.casefold()))
 
 
 def declared_records() -> Iterator[tuple[type, dict[str, Quantity]]]:
-    """Return every class of records with its quantities by attribute; imports the whole package."""
+    """Yield every class of records with its quantities by attribute; imports the whole package."""
     for module in pkgutil.walk_packages([str(Path(__file__).parents[1])], "tfarm."):
         # it acts when it is imported
         if module.name == "tfarm.__main__":
@@ -49,7 +54,8 @@ def declared_records() -> Iterator[tuple[type, dict[str, Quantity]]]:
         for kind in vars(import_module(module.name)).values():
             # of a class whose annotations are for type checkers alone
             with suppress(NameError):
-                if isinstance(kind, type) and kind.__module__ == module.name and quantities(kind):
+                is_own = isinstance(kind, type) and kind.__module__ == module.name
+                if is_own and quantities(kind):
                     yield kind, quantities(kind)
 
 
@@ -71,12 +77,9 @@ def glossary(words: str | None = None) -> Glossary:
 
     Raises ParameterError where there is none.
     """
-    every = {
-        Declared(of.label, of.unit, of.help)
-        for _, all_of in declared_records()
-        for of in all_of.values()
-        if of.label and of.help
-    }
+    every = set()
+    for _, declared in declared_records():
+        every |= {Declared(of.label, of.unit, of.help) for of in declared.values() if of.label and of.help}
     part = (words or "").casefold()
     terms = tuple(each for each in GLOSSARY_TERMS if part in each.name.casefold())
     in_order = sorted(every, key=lambda each: (each.label.casefold(), each.unit, each.meaning))

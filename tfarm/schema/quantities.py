@@ -17,8 +17,6 @@ COMPLEX_ERROR = 2e-14
 NO_VALUE = "-"
 # what is compared where neither has a value
 EMPTY = {"None", "", "[]", "()"}
-# of two records that have none
-NAMES = ("first", "second")
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +56,12 @@ class Percent(float):
     unit = "%"
 
     def as_text(self, digits: int) -> str:
-        """The number with its unit."""
+        """Return the number with its unit."""
         return f"{general(100 * self, digits)} {self.unit}"
 
 
 def quantities(kind: Any) -> dict[str, Quantity]:
-    """The quantities of a class of records by attribute: those of its fields, then those of its properties."""
+    """Return the quantities of a class of records by attribute: those of its fields, then those of its properties."""
     return _quantities(kind)
 
 
@@ -72,8 +70,11 @@ def _quantities(kind: Any) -> dict[str, Quantity]:
     hints = get_type_hints(kind, include_extras=True)
     for base in reversed(kind.__mro__):
         for name, member in vars(base).items():
-            is_lazy = isinstance(member, cached_property)
-            read: Any = member.func if is_lazy else member.fget if isinstance(member, property) else None
+            read: Any = None
+            if isinstance(member, cached_property):
+                read = member.func
+            elif isinstance(member, property):
+                read = member.fget
             if read is not None and "Annotated" in str(read.__annotations__.get("return")):
                 hints[name] = get_type_hints(read, include_extras=True)["return"]
     found = {}
@@ -88,18 +89,19 @@ def _quantities(kind: Any) -> dict[str, Quantity]:
 
 
 def quantities_of(record: Any, parent: Any = None) -> dict[str, Quantity]:
-    """The quantities of a record with labels and units of its own: its `titles` by attribute, and each `unit_of`.
+    """Return the quantities of a record with its own labels and units: its `titles` by attribute, and each `unit_of`.
 
     `parent` is the record that has it as a row.
     """
     titles: Mapping[str, tuple[str, str]] = getattr(record, "titles", {})
     found = dict(quantities(type(record)))
     for name, of in found.items():
-        if name in titles or of.unit_of:
-            label, unit = titles.get(
-                name, (of.label, getattr(record, of.unit_of, getattr(parent, of.unit_of, "")))
-            )
+        if name in titles:
+            label, unit = titles[name]
             found[name] = replace(of, label=label, unit=unit)
+        elif of.unit_of:
+            unit = getattr(record, of.unit_of, getattr(parent, of.unit_of, ""))
+            found[name] = replace(of, unit=unit)
     return found
 
 
@@ -120,7 +122,7 @@ def is_list_of_records(value: Any) -> bool:
 
 
 def with_flat(record: Any) -> Iterator[tuple[Any, Quantity, Any]]:
-    """Values and quantities of a record and the record itself, those of records that are flat in their place."""
+    """Yield values and quantities of a record and the record itself, those of flat records in their place."""
     for name, of in quantities_of(record).items():
         value = getattr(record, name)
         if of.flat and is_declared(value):
@@ -130,7 +132,7 @@ def with_flat(record: Any) -> Iterator[tuple[Any, Quantity, Any]]:
 
 
 def entries(record: Any, under: str = "") -> Iterator[tuple[str, Quantity, Any]]:
-    """Label, quantity and value of what has one value, in records inside the record too."""
+    """Yield label, quantity and value of each entry that has one value, of records inside the record too."""
     for value, of, _ in with_flat(record):
         label = f"{under}{of.label}"
         if hasattr(value, "as_text") and not isinstance(value, Percent):
@@ -147,7 +149,7 @@ def entries(record: Any, under: str = "") -> Iterator[tuple[str, Quantity, Any]]
 
 
 def to_dict(record: Any) -> dict[str, Any]:
-    """The quantities of a record by their keys, as JSON has them: a complex number is [real, imaginary]."""
+    """Return the quantities of a record by their keys, as JSON has them: a complex number is [real, imaginary]."""
     found: dict[str, Any] = {}
     for name, of in quantities(type(record)).items():
         value = getattr(record, name)
@@ -162,20 +164,17 @@ def to_dict(record: Any) -> dict[str, Any]:
 
 
 def to_json_value(value: Any) -> Any:
-    """One entry of `to_dict`.  Infinities stay; they are texts in `to_json`."""
+    """Return one entry of `to_dict`.  Infinities stay; they are texts in `to_json`."""
     if value is None or type(value) in (float, int, str, bool):
         return value
     if is_table(value):
-        columns = {
-            of.key: to_json_value(getattr(value, name)) for name, of in quantities(type(value)).items()
-        }
+        columns = to_dict(value)
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     if is_declared(value):
         return to_dict(value)
     if isinstance(value, np.ndarray | np.generic):
-        if np.iscomplexobj(value):
-            return to_json_value(value.tolist())
-        return value.tolist()
+        plain = value.tolist()
+        return to_json_value(plain) if np.iscomplexobj(value) else plain
     if isinstance(value, complex):
         return None if math.isnan(value.real) else [value.real, value.imag]
     if isinstance(value, Mapping):
@@ -189,7 +188,7 @@ def to_json_value(value: Any) -> Any:
 
 
 def with_unit(value: Any, of: Quantity) -> str:
-    """A value and its unit, and where it has one its frequency."""
+    """Return a value and its unit, and where it has one its frequency."""
     if isinstance(value, At):
         at = "" if value.omega is None else f" at {value.omega:.6g} rad/s"
         return with_unit(value.value, of) + at
@@ -203,7 +202,7 @@ def with_unit(value: Any, of: Quantity) -> str:
 
 
 def text(value: Any, digits: int = 6) -> str:
-    """One value as a person reads it; "-" where there is none."""
+    """Return one value as a person reads it; "-" where there is none."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return NO_VALUE
     if isinstance(value, bool | np.bool_):
@@ -222,16 +221,14 @@ def text(value: Any, digits: int = 6) -> str:
     if isinstance(value, Mapping):
         return ", ".join(f"{key} {text(entry, digits)}" for key, entry in value.items())
     shown = ", ".join(text(entry, digits) for entry in value)
-    is_pair = (
-        isinstance(value, tuple)
-        and len(value) == 2
-        and not any(isinstance(each, str | tuple) for each in value)
-    )
-    return f"({shown})" if is_pair else shown
+    is_pair = isinstance(value, tuple) and len(value) == 2
+    if is_pair and not any(isinstance(each, str | tuple) for each in value):
+        return f"({shown})"
+    return shown
 
 
 def round_parts(value: complex, digits: int) -> tuple[str, str]:
-    """Both parts in digits that rounding leaves of the number's size."""
+    """Return both parts in digits that rounding leaves of the number's size."""
     error = COMPLEX_ERROR * abs(value)
     re, im = (round_to_error(part, error, digits) if error else "0" for part in (value.real, value.imag))
     return re, im
@@ -254,11 +251,11 @@ class Difference(NamedTuple):
     one: Annotated[Any, Quantity("first", digits=8, help="value of the first record")]
     other: Annotated[Any, Quantity("second", digits=8, help="value of the second record")]
     # of the records
-    names: tuple[str, str] = NAMES
+    names: tuple[str, str] = ("first", "second")
 
     @property
     def titles(self) -> dict[str, tuple[str, str]]:
-        """Those of the values are the names of the records."""
+        """The titles of the values: the names of the records."""
         return {"one": (self.names[0], ""), "other": (self.names[1], "")}
 
     @property
@@ -279,16 +276,19 @@ class Difference(NamedTuple):
         return PercentagePoints(gap) if isinstance(one, Percent) else gap
 
 
-def compare_records(one: Any, other: Any, names: tuple[str, str] = NAMES) -> list[Difference]:
-    """The quantities that two records have, or the records in two lists, row by row.
+def compare_records(one: Any, other: Any, names: tuple[str, str] | None = None) -> list[Difference]:
+    """Return the quantities that two records have, or the records in two lists, row by row.
 
     Records in lists, and rows of tables, are paired by their first quantity, a name or a number.
     """
-    rows = (_of_rows if isinstance(one, list) else _of_records)(one, other)
+    rows = _of_rows(one, other) if isinstance(one, list) else _of_records(one, other)
+    if names is None:
+        return list(rows)
     return [each._replace(names=names) for each in rows]
 
 
 def _of_records(one: Any, other: Any) -> Iterator[Difference]:
+    """Yield differences of the quantities of two records, then those of their tables."""
     # characters of a text that is compared: a word or an interval, and no sentence
     longest_compared = 28
     others = {label: value for label, _, value in entries(other)}
@@ -303,7 +303,7 @@ def _of_records(one: Any, other: Any) -> Iterator[Difference]:
 
 
 def _of_rows(some: Sequence[Any], others: Sequence[Any]) -> Iterator[Difference]:
-    """Differences of rows; a text that is the same in both rows is none."""
+    """Yield differences of rows; a text that is the same in both rows is none."""
     if not some:
         return
     key, of = next(iter(quantities(type(some[0])).items()))

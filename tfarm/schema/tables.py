@@ -102,41 +102,36 @@ class Table:
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         keys = [column.key for column in self.columns]
-        return (
-            dict(zip(keys, row, strict=True))
-            for row in zip(*(column.of for column in self.columns), strict=True)
-        )
+        values = [column.of for column in self.columns]
+        return (dict(zip(keys, row, strict=True)) for row in zip(*values, strict=True))
 
 
 def table(
     rows: Any, names: Sequence[str] = (), *, parent: Any = None, stem: str = "", title: str = ""
 ) -> Table:
-    """A row a record (or an entry of a record of columns), a column a quantity: those with a label, or these.
+    """Return a row a record (or an entry of a record of columns), a column a quantity: those with a label, or these.
 
     A column without any value is left out unless it is named.  `parent` is the record that has these rows.
     """
     columns: list[Column] = []
-    declared = quantities_of(rows if is_table(rows) else rows[0], parent) if is_table(rows) or rows else {}
-    for name in (names or [name for name, of in declared.items() if of.label]) if declared else ():
-        values = list(getattr(rows, name)) if is_table(rows) else [getattr(row, name) for row in rows]
-        if names or not values or any(value is not None and str(value) for value in values):
-            of = declared[name]
-            cells = [
-                NO_VALUE if isinstance(each, list | tuple) and not each else text(each, of.digits)
-                for each in values
-            ]
-            columns.append(
-                Column(
-                    of.key,
-                    of.label,
-                    of.unit,
-                    of=list(map(to_json_value, values)),
-                    shown=cells,
-                    folds=_folds(cells),
-                    help=of.help,
-                )
-            )
+    is_of_columns = is_table(rows)
+    if is_of_columns or rows:
+        declared = quantities_of(rows if is_of_columns else rows[0], parent)
+        for name in names or [name for name, of in declared.items() if of.label]:
+            values = list(getattr(rows, name)) if is_of_columns else [getattr(row, name) for row in rows]
+            if names or not values or any(value is not None and str(value) for value in values):
+                columns.append(_column(values, declared[name]))
     return Table(columns=tuple(columns), stem=stem, title=title)
+
+
+def _column(values: Sequence[Any], of: Quantity) -> Column:
+    """Return the column of a quantity."""
+    cells = []
+    for value in values:
+        is_empty = isinstance(value, list | tuple) and not value
+        cells.append(NO_VALUE if is_empty else text(value, of.digits))
+    plain = list(map(to_json_value, values))
+    return Column(of.key, of.label, of.unit, of=plain, shown=cells, folds=_folds(cells), help=of.help)
 
 
 def _folds(cells: Sequence[str]) -> bool:
@@ -147,12 +142,16 @@ def _folds(cells: Sequence[str]) -> bool:
 
 
 def across(records: Mapping[str, Any], *, keys: Sequence[str] = (), title: str = "") -> Table:
-    """A row a quantity that has one value, a column a record; the records are named, `keys` are those of columns."""
-    found = [{label: (of, value) for label, of, value in entries(each)} for each in records.values()]
-    known = {label: of for each in found for label, (of, _) in each.items()}
-    labels = [
-        label for label in known if any(str(each[label][1]) not in EMPTY for each in found if label in each)
-    ]
+    """Return a row a quantity with one value, a column a record; the records are named, `keys` are those of columns."""
+    found = []
+    known: dict[str, Quantity] = {}
+    filled = set()
+    for record in records.values():
+        own = {label: (of, value) for label, of, value in entries(record)}
+        found.append(own)
+        known |= {label: of for label, (of, _) in own.items()}
+        filled |= {label for label, (_, value) in own.items() if str(value) not in EMPTY}
+    labels = [label for label in known if label in filled]
     columns = [
         Column("quantity", "quantity", of=labels, helps=[known[label].help for label in labels]),
         Column("unit", "unit", of=[known[label].unit for label in labels]),
@@ -169,20 +168,15 @@ def across(records: Mapping[str, Any], *, keys: Sequence[str] = (), title: str =
 
 
 def roots_table(values: Any, of: Quantity) -> Table:
-    """A row a complex number: its real and imaginary part, and of a pole or zero in 1/s its damping ratio."""
+    """Return a row a complex number: its real and imaginary part, and of a pole or zero in 1/s its damping ratio."""
     # of the damping ratio of a listed pole
     ratio_digits = 6
     roots = [complex(value) for value in values]
     shown = [round_parts(root, of.digits) for root in roots]
+    unit = of.unit.replace("1/s", "rad/s")
     columns = [
         Column("re", f"Re {of.label}", of.unit, of=[s.real for s in roots], shown=[re for re, _ in shown]),
-        Column(
-            "im",
-            f"Im {of.label}",
-            of.unit.replace("1/s", "rad/s"),
-            of=[s.imag for s in roots],
-            shown=[im for _, im in shown],
-        ),
+        Column("im", f"Im {of.label}", unit, of=[s.imag for s in roots], shown=[im for _, im in shown]),
     ]
     if of.unit == "1/s":
         ratios = [
@@ -194,7 +188,7 @@ def roots_table(values: Any, of: Quantity) -> Table:
 
 
 def curve_table(record: Any) -> Table:
-    """The curves of a record, a row a point; complex ones in two columns.  Without any, the first list of records."""
+    """Return the curves of a record, a row a point, complex ones in two columns; else the first list of records."""
     if hasattr(record, "csv_table"):
         return record.csv_table
     columns: list[Column] = []
@@ -219,7 +213,7 @@ def curve_table(record: Any) -> Table:
 
 @dataclass(frozen=True, slots=True)
 class RecordSection:
-    """What is read of a record one below the other: pairs of label and text, or a table, under a title."""
+    """Part of a record as a person reads it, under a title: pairs of label and text, a table or a drawing."""
 
     title: str = ""
     pairs: list[tuple[str, str]] = field(default_factory=list)
@@ -228,7 +222,7 @@ class RecordSection:
 
 
 def sections(record: Any, title: str = "") -> list[RecordSection]:
-    """A record as a person reads it: tables declared `first`, single values, other tables, the records inside it."""
+    """Return a record as a person reads it: tables declared `first`, single values, other tables, records inside."""
     own = RecordSection(title)
     first: list[RecordSection] = []
     later: list[RecordSection] = []
@@ -256,9 +250,9 @@ def sections(record: Any, title: str = "") -> list[RecordSection]:
 
 
 def to_json(answer: Any, **how: Any) -> str:
-    """One JSON object in ASCII, which every pipe takes; a table in it is a list of its rows.  NaN raises ValueError.
+    """Return one JSON object in ASCII, which every pipe takes; a table in it is a list of its rows.
 
-    `how` are further options of `json.dumps`.
+    `how` are further options of `json.dumps`.  NaN raises ValueError.
     """
     try:
         return json.dumps(answer, allow_nan=False, default=list, **how)
@@ -268,7 +262,7 @@ def to_json(answer: Any, **how: Any) -> str:
 
 
 def json_value(value: Any) -> Any:
-    """A value as JSON has it: a table as its rows, a tuple as a list, an infinity as a text."""
+    """Return a value as JSON has it: a table as its rows, a tuple as a list, an infinity as a text."""
     if isinstance(value, float):
         if math.isnan(value):
             raise ValueError("an answer or a table holds a NaN")
@@ -281,14 +275,14 @@ def json_value(value: Any) -> Any:
 
 
 def as_json(table: Table) -> str:
-    """{"table", "units", "rows": [{key: value}, ...]}."""
+    """Return {"table", "units", "rows": [{key: value}, ...]} as JSON."""
     units = {column.key: column.unit for column in table.columns if column.unit}
     whole = {"table": table.title, "units": units, "rows": table}
     return f"{to_json(whole, ensure_ascii=False)}\n"
 
 
 def as_csv(table: Table, *, units: bool = False) -> str:
-    """Comma-separated values, shortest exact digits; several values in a cell are separated by a space.
+    """Return comma-separated values, shortest exact digits; several values in a cell are separated by a space.
 
     With `units` these stand in brackets behind the keys.
     """
@@ -303,7 +297,7 @@ def as_csv(table: Table, *, units: bool = False) -> str:
 
 
 def _csv_cells(column: Column) -> Sequence[str]:
-    """The cells of a column; those of records, such as intervals, are texts, and JSON has their numbers."""
+    """Return the cells of a column; those of records, such as intervals, are texts, and JSON has their numbers."""
     if any(map(_holds_records, column.of)):
         return [cell if value else "" for cell, value in zip(column.cells, column.of, strict=True)]
     found = ("" if value is None else json_value(value) for value in column.of)
@@ -315,8 +309,9 @@ def _holds_records(value: Any) -> bool:
 
 
 def save_table(table: Table, folder: Path, kinds: Sequence[str] = ("csv", "json")) -> tuple[str, ...]:
-    """A report's table as CSV and JSON, or one of these: the names of the files."""
-    for kind in kinds:
+    """Write a report's table as CSV and JSON, or one of these; return the names of the files."""
+    names = tuple(f"{table.stem}.{kind}" for kind in kinds)
+    for name, kind in zip(names, kinds, strict=True):
         content = as_csv(table) if kind == "csv" else as_json(table)
-        (folder / f"{table.stem}.{kind}").write_text(content, encoding="utf-8", newline="")
-    return tuple(f"{table.stem}.{kind}" for kind in kinds)
+        (folder / name).write_text(content, encoding="utf-8", newline="")
+    return names

@@ -103,13 +103,7 @@ def table_lines(table: Table, width: int | None = None) -> list[str]:
     widths = [widest([each.heading, *each.cells]) for each in columns]
     # rich would take a second for two thousand rows
     if sum(widths) + COLUMN_GAP * (len(widths) - 1) <= width:
-        aligned = [
-            [
-                set_cell_size(cell, size) if is_text else " " * (size - cell_len(cell)) + cell
-                for cell in (each.heading, *each.cells)
-            ]
-            for each, size, is_text in zip(columns, widths, [each.is_text for each in columns], strict=True)
-        ]
+        aligned = map(aligned_cells, columns, widths)
         return [(" " * COLUMN_GAP).join(row).rstrip() for row in zip(*aligned, strict=True)]
     leading = columns[: table.leading]
     blocks: list[list[Column]] = [[*leading]]
@@ -130,6 +124,14 @@ def table_lines(table: Table, width: int | None = None) -> list[str]:
             grid.add_row(*map(Text, row))
         lines += [""] * bool(lines) + render_lines(grid, max(width, least_width(block, shortest)))
     return lines
+
+
+def aligned_cells(column: Column, width: int) -> list[str]:
+    """Return heading and cells of a column in that width, words to the left and numbers to the right."""
+    texts = (column.heading, *column.cells)
+    if column.is_text:
+        return [set_cell_size(each, width) for each in texts]
+    return [" " * (width - cell_len(each)) + each for each in texts]
 
 
 def render_lines(shown: RenderableType, width: int | None) -> list[str]:

@@ -23,21 +23,14 @@ from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import Analytic
 
-# so is one with a larger change of ln f at the rate of either end
-FORESEEN = 1.0
 # a contour cannot be resolved closer to a zero than this share of |s|
 NEAREST_TO_ZERO = 1e-13
 # of each edge of a contour, before refinement
 FIRST_POINTS = 40
-# of the function in one search; the most that 300 random loops took is 4,100
-MOST_CALLS = 30_000
 # of its size: a smaller imaginary part is rounding
 REAL_SHARE = 1e-11
 # of a box, where a zero lies on its edge
 TRIED_HEIGHTS = (1.0, 1.0041, 1.0093, 1.0171, 1.0311, 1.0573, 1.113)
-# of a side, where a box is cut: off the axes, on which zeros often are
-SPLIT = 0.4871
-
 
 Function = Callable[[Complex], Analytic]
 
@@ -75,19 +68,22 @@ class Box(NamedTuple):
         """Return the box cut across its longer side, geometrically where that side spans decades."""
         left, right, low, high = self
         if high - low >= right - left:
-            cut = SPLIT * high if self.is_symmetric else _between(low, high)
-            return self._replace(im_min=-cut if self.is_symmetric else low, im_max=cut), self._replace(
-                im_min=cut
-            )
-        cut = _between(left, right)
+            if self.is_symmetric:
+                cut = _cut(0.0, high)
+                return self._replace(im_min=-cut, im_max=cut), self._replace(im_min=cut)
+            cut = _cut(low, high)
+            return self._replace(im_max=cut), self._replace(im_min=cut)
+        cut = _cut(left, right)
         return self._replace(re_max=cut), self._replace(re_min=cut)
 
 
-def _between(low: float, high: float) -> float:
+def _cut(low: float, high: float) -> float:
     """Return the point at which a side is cut, near the geometric mean of two uneven edges on one side of 0."""
-    if (low > 0 and high > 8 * low) or (high < 0 and low < 8 * high):
-        return math.copysign(abs(low) ** (1 - SPLIT) * abs(high) ** SPLIT, low)
-    return low + SPLIT * (high - low)
+    # of the side: off the axes, on which zeros often are
+    split = 0.4871
+    if high > 8 * low > 0 or low < 8 * high < 0:
+        return math.copysign(abs(low) ** (1 - split) * abs(high) ** split, low)
+    return low + split * (high - low)
 
 
 def winding_number(function: Function, box: Box, points: int = FIRST_POINTS) -> int:
@@ -109,8 +105,9 @@ def argument_change(
 ) -> float:
     """Return the change of the argument [rad] of a function along a path of points, which is refined.
 
-    A step is halved above 0.6 rad.  Raises ConvergenceError where a zero is nearer to the path than the share `nearest`
-    of |s|, with |s| between 1e-8 and 1 times `across`, and for more than 200,000 points.
+    A step is halved above 0.6 rad, and where the rate of ln f at either end foresees a change above 1.
+    Raises ConvergenceError where a zero is nearer to the path than the share `nearest` of |s|, with |s| between 1e-8
+    and 1 times `across`, and for more than 200,000 points.
     """
     phase, rate = _phase(function, path)
     start = np.array([path[:-1], phase[:-1], rate[:-1]])
@@ -122,12 +119,13 @@ def argument_change(
         step = np.angle(np.exp(1j * (end[1] - start[1]).real))
         foreseen = abs(length) * np.maximum(abs(start[2]), abs(end[2]))
         # nan is not smooth
-        smooth = (abs(step) <= 0.6) & (foreseen <= FORESEEN)
+        smooth = (abs(step) <= 0.6) & (foreseen <= 1.0)
         angle += float(step[smooth].sum())
-        start = start[:, ~smooth]
-        end = end[:, ~smooth]
-        length = length[~smooth]
-        step = step[~smooth]
+        rough = ~smooth
+        start = start[:, rough]
+        end = end[:, rough]
+        length = length[rough]
+        step = step[rough]
         if not length.size:
             return angle
         smallest = nearest * np.clip(abs(start[0]), 1e-8 * across, across)
@@ -137,7 +135,7 @@ def argument_change(
         middle = np.array([halfway, *_phase(function, halfway)])
         start = np.hstack([start, middle])
         end = np.hstack([middle, end])
-        seen = seen + halfway.size
+        seen += halfway.size
 
 
 def _phase(function: Function, points: Complex) -> tuple[NDArray[np.float64], Complex]:
@@ -163,7 +161,9 @@ def newton(
     settled = np.zeros(s.size, bool)
     moving = np.arange(s.size)
     last = np.full(s.size, np.inf)
-    many = longest = since = 0
+    many = 0
+    longest = 0
+    since = 0
     for step in range(60):
         at = function(s[moving])
         # a diverging start, or one at f' = 0, is dropped
@@ -178,13 +178,17 @@ def newton(
         size = abs(s[moving])
         settled[moving] = away < 1e-11 * size
         ended = (away <= 1e-15 * size) | (settled[moving] & (away > 0.9 * last[moving]))
-        last[moving], moving = away, moving[~ended]
-        if listed is not None and settled.sum() > many:
-            many = settled.sum()
-            length = listed(s[settled]).size
-            longest, since = (length, step) if length > longest else (longest, since)
-        if listed is not None and (longest >= expected or step - since > 6):
-            moving = moving[settled[moving]]
+        last[moving] = away
+        moving = moving[~ended]
+        if listed is not None:
+            if settled.sum() > many:
+                many = settled.sum()
+                length = listed(s[settled]).size
+                if length > longest:
+                    longest = length
+                    since = step
+            if longest >= expected or step - since > 6:
+                moving = moving[settled[moving]]
         if not moving.size:
             break
     return distinct(s[settled & np.isfinite(s)])
@@ -236,7 +240,8 @@ def _apart(
     with np.errstate(all="ignore"):
         alone = at.slope / at.value - (1 / (s[:, None] - zeros)).sum(axis=1)
         between = s[:, None] - others
-        step = 1 / (alone - np.where(between == 0, 0, 1 / between).sum(axis=1))
+        repelled = np.where(between == 0, 0, 1 / between).sum(axis=1)
+        step = 1 / (alone - repelled)
         away = abs(1 / alone)
     known = np.isfinite(step)
     s = s[known]
@@ -263,16 +268,24 @@ def distinct(points: Complex) -> Complex:
 NOTHING_KNOWN: Complex = np.empty(0, complex)
 
 
-def zeros_in_box(function: Function, box: Box, starts: Complex, known: Complex = NOTHING_KNOWN) -> Complex:
+def zeros_in_box(
+    function: Function,
+    box: Box,
+    starts: Complex,
+    known: Complex = NOTHING_KNOWN,
+    *,
+    most_calls: int = 30_000,
+) -> Complex:
     """Return all zeros in the box with multiplicity, by their winding number.
 
-    `known` zeros are not searched, such as those next to s = 0, where Newton's method is not reliable.
+    `known` zeros are not searched, such as those next to s = 0, where Newton's method is not reliable.  The function is
+    called at most `most_calls` times; the most that 300 random loops took is 4,100.
     Raises ConvergenceError, with the zeros found, where others are missing.
     """
     calls = count()
 
     def counted(s: Complex) -> Analytic:
-        if next(calls) > MOST_CALLS:
+        if next(calls) > most_calls:
             raise ConvergenceError(
                 f"too many cuts below Im s = {box.im_max:.4g}: float64 does not separate the zeros there",
                 s,
@@ -301,7 +314,8 @@ def complete_zeros(
             return complete_zeros(function, box_of, factor * height, starts, known, (1.0,))
     box = box_of(factors[-1] * height)
     found = zeros_in_box(function, box, starts, known)
-    return np.where(abs(found.imag) < REAL_SHARE * abs(found), found.real, found), box
+    is_real = abs(found.imag) < REAL_SHARE * abs(found)
+    return np.where(is_real, found.real, found), box
 
 
 def _search(
@@ -317,7 +331,9 @@ def _search(
     width = max(box.re_max - box.re_min, box.im_max - box.im_min)
 
     def listed(points: Complex) -> Complex:
-        points = distinct(np.r_[points, points.conj()] if mirrored else points)
+        if mirrored:
+            points = np.r_[points, points.conj()]
+        points = distinct(points)
         # deflation at s = 0 leaves noise there
         points = points[box.holds(points) & (abs(points) > dead_zone * width)]
         again = (abs(points[:, None] - known) < 0.1 * abs(known)).any(axis=1)
@@ -328,7 +344,8 @@ def _search(
         # between each corner and its opposite
         grid = np.outer(box.corners, (0.8, 0.55)) + np.outer(np.roll(box.corners, 2), (0.2, 0.45))
         starts_here = np.concatenate([starts[box.holds(starts)], grid.ravel()])
-        starts_here = starts_here[starts_here.imag >= 0] if mirrored else starts_here
+        if mirrored:
+            starts_here = starts_here[starts_here.imag >= 0]
         # at first, and where rounding makes several points of one zero
         if not depth or inside.size > expected:
             found = newton(function, starts_here, listed, expected)
@@ -336,7 +353,8 @@ def _search(
     missing = expected - inside.size - (abs(found) <= dead_zone * width).sum()
     if missing > 0:
         missing = math.ceil(missing / (1 + mirrored))
-        zeros = distinct(np.r_[known, found, found.conj()] if mirrored else np.r_[known, found])
+        mirrors = found.conj() if mirrored else found[:0]
+        zeros = distinct(np.r_[known, found, mirrors])
         near = find_other_zeros(function, starts_here, zeros, box, missing)
         if near.size:
             found = np.r_[found, newton(function, near)]
@@ -404,22 +422,24 @@ def filled_box(
     first = listed[:, 0]
     top = first.imag[is_right(first, C) & (first.imag < height)].max(initial=0.0)
     if top > 0:
-        height = float(top + min(others[:, 0].imag[others[:, 0].imag > top], default=ABOVE_LAST * top)) / 2
+        beyond = others[:, 0].imag
+        height = float(top + min(beyond[beyond > top], default=ABOVE_LAST * top)) / 2
     found, box = complete_zeros(f, lambda tried: _box(tried, starts, C), height, starts)
     return box, found
 
 
 def is_right(zeros: Complex, C: float) -> NDArray[np.bool_]:
     """Return which zeros are right of the farthest left edge of a box, without NaN."""
-    return np.asarray(zeros.real > (-TOWARD_SINGULAR / C if C else -np.inf))
+    left = -TOWARD_SINGULAR / C if C else -np.inf
+    return np.asarray(zeros.real > left)
 
 
 def _heights(listed: Complex, others: Complex, C: float) -> Real:
     """Return heights between the zeros right of -1/C, ascending, below the first one that is not listed."""
     mine, theirs = (each.imag[is_right(each, C)] for each in (listed[:, 0], others[:, 0]))
     imag = np.sort(np.r_[mine, theirs])
-    tops = np.r_[imag, imag[-1] * ABOVE_LAST if imag.size else 1.0 / C]
-    heights = 0.5 * (np.r_[0.0, imag] + tops)
+    last = imag[-1] * ABOVE_LAST if imag.size else 1.0 / C
+    heights = 0.5 * (np.r_[0.0, imag] + np.r_[imag, last])
     return heights[(heights > 0) & (heights < theirs.min(initial=np.inf))]
 
 

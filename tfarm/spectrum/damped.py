@@ -10,6 +10,7 @@ import math
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
+from itertools import chain
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -32,14 +33,10 @@ from tfarm.spectrum.proofs import Disc, disjoint, enclose_zero, proven_count
 from tfarm.spectrum.shapes import mode_field
 from tfarm.spectrum.table import Modes, first_frequency, modes
 
-# modes named beyond the list: a box may end below them
-COMPANY = 6
 # of a damped table
 MOST_MODES = 300
-# of the lowest frequency, and number: points of the negative real axis
+# the origin of an eigenvalue that no part of the drive determines
 NOT_ASSIGNED = "not assigned"
-# of a part, for differences: float64 has D to 1e-15 of its terms
-PART_STEP = Fraction(1, 10_000)
 
 
 class Unassigned(NamedTuple):
@@ -106,21 +103,23 @@ class DampedModes:
         """
         k = self.undamped.system
         discs = []
-        for pair in self._listed:
+        for pair in self._every_pair:
             wanted = pair[:1] if pair[0].imag > 0 else pair[np.isfinite(pair)]
-            discs.append(tuple(enclose_zero(k, complex(zero), digits) for zero in wanted))
+            discs.append(tuple(enclose_zero(k, zero, digits) for zero in wanted.tolist()))
             for zero, disc in zip(wanted.tolist(), discs[-1], strict=True):
-                apart = max(abs(pair[0] - pair[-1]) if np.isfinite(pair[-1]) else abs(zero), LEAST_SIZE)
+                size = abs(zero)
+                apart = abs(pair[0] - pair[-1]) if np.isfinite(pair[-1]) else size
                 away = abs(complex(float(disc.re), float(disc.im)) - zero)
                 # 1e-12: largest distance of a listed eigenvalue from its disc, of its size (more near its partner)
-                if away > float(disc.radius) + 1e-12 * abs(zero) * max(1.0, abs(zero) / apart):
+                most = 1e-12 * size * max(1.0, size / max(apart, LEAST_SIZE))
+                if away > float(disc.radius) + most:
                     raise CertificationError(
                         f"next to {zero:.12g} 1/s lies {disc.re} + {disc.im}i, not the eigenvalue listed"
                     )
-        if not disjoint([disc for pair in discs for disc in pair]):
+        if not disjoint(list(chain.from_iterable(discs))):
             raise CertificationError("the discs of two eigenvalues touch: more digits are needed")
         proven = proven_count(k, self.box)
-        listed = int(self.box.holds(self._listed.ravel()).sum()) + k.at_rest
+        listed = int(self.box.holds(self._every_pair.ravel()).sum()) + k.at_rest
         if not listed == self.count == proven:
             raise CertificationError(
                 f"the box has {proven} eigenvalues, but the list {listed} and the record {self.count}"
@@ -140,13 +139,14 @@ class DampedModes:
         return np.stack([zeros, np.where(zeros.imag > 0, zeros.conj(), np.nan)], axis=-1)
 
     @property
-    def _listed(self) -> Complex:
+    def _every_pair(self) -> Complex:
         """Every eigenvalue of the record other than 0, (n, 2): of the flexible modes, single ones, unassigned ones.
 
         Rows with one eigenvalue or none have NaN.
         """
-        alone = np.stack([self.single, np.full(self.single.size, np.nan)], axis=-1)
-        return np.concatenate([self.eigenvalues[self.index > 0], alone, self.unassigned_pairs])
+        return np.concatenate(
+            [self.eigenvalues[self.index > 0], _in_rows(self.single), self.unassigned_pairs]
+        )
 
     # ------------------------------------------------------------ shapes
 
@@ -171,15 +171,11 @@ class DampedModes:
         k = self.undamped.system
         share = on_the_arm("x", x, float(k.length)) / float(k.length)
         zeros = self.eigenvalues[self.index > 0]
-        unknown = np.full(share.size, complex(np.nan, np.nan))
-        values = [
-            [
-                mode_field(k, complex(zero), quantity, share.ravel()) if np.isfinite(zero) else unknown
-                for zero in pair
-            ]
-            for pair in zeros
-        ]
-        return np.array(values, dtype=complex).reshape(*zeros.shape, *share.shape)
+        values = np.full((zeros.size, share.size), complex(np.nan, np.nan))
+        for row, zero in zip(values, zeros.ravel().tolist(), strict=True):
+            if np.isfinite(zero):
+                row[:] = mode_field(k, zero, quantity, share.ravel())
+        return values.reshape(*zeros.shape, *share.shape)
 
 
 def damped_modes(undamped: Modes, *, steps: float = math.inf, reach: float = math.inf) -> DampedModes:
@@ -195,55 +191,60 @@ def damped_modes(undamped: Modes, *, steps: float = math.inf, reach: float = mat
         raise ParameterError(key="modes", value=undamped, remedy="give what tfarm.modes returns")
     count = int(undamped.index.max())
     most = count if undamped.arm.is_undamped else min(count, MOST_MODES)
-    found = _searched_once(undamped.arm, undamped.theory, most, steps, reach)
+    found = _first_modes(undamped.arm, undamped.theory, most, steps, reach)
     return replace(found, left_out=count - int(found.index.max()))
 
 
-@lru_cache(maxsize=LISTS_KEPT)  # one page needs the same modes some ninety times
-def _searched_once(arm: Arm, theory: Theory, count: int, steps: float, reach: float) -> DampedModes:
+# one page needs the same modes some ninety times
+@lru_cache(maxsize=LISTS_KEPT)
+def _first_modes(arm: Arm, theory: Theory, count: int, steps: float, reach: float) -> DampedModes:
     """Return the first `count` modes of an arm, or half of them where their box cannot be searched."""
     try:
-        return _searched(modes(arm, count, theory=theory), steps, reach)
+        return _search(modes(arm, count, theory=theory), steps, reach)
     except ConvergenceError:
         if count == 1:
             raise
-        return _searched_once(arm, theory, count // 2, steps, reach)
+        return _first_modes(arm, theory, count // 2, steps, reach)
 
 
-def _searched(undamped: Modes, steps: float, reach: float) -> DampedModes:
+def _search(undamped: Modes, steps: float, reach: float) -> DampedModes:
     """Return all eigenvalues in a box, assigned to their modes where that is certain."""
     k = undamped.system
     arm = undamped.arm
     theory = undamped.theory
     count = int(undamped.index.max())
-    omega = modes(arm, count + COMPANY, theory=theory).flexible
-    single, every = name_eigenvalues(undamped, count + int((k.damping * omega[count:] < reach).sum()), steps)
+    # 6 modes named beyond the list: a box may end below them
+    omega = modes(arm, count + 6, theory=theory).flexible
+    beyond = int((k.damping * omega[count:] < reach).sum())
+    single, every = name_eigenvalues(undamped, count + beyond, steps)
     pairs = every[:count]
     company = every[count:]
     omega = omega[: count + 1]
     lost = np.flatnonzero(np.isnan(pairs[:, 0]))
-    box, found = _boxed(undamped, omega, _with_single(single, pairs), company)
+    box, found = _box_of(undamped, omega, np.concatenate([_in_rows(single), pairs]), company)
     for zeros in (single, pairs):
         zeros[box.holds(zeros) & ~is_among(zeros, found)] = LOST
     unnamed = found[(found.imag >= 0) & ~is_among(found, np.r_[single, pairs.ravel()])]
     free = np.r_[single[single.imag != 0], unnamed]
     # zeros of the drive may be in the place of modes
     if free.size:
-        of_drive = np.reshape(
-            [each != NOT_ASSIGNED for each in origins_of(k, pairs.ravel())], pairs.shape
-        ).any(axis=1)
+        origins = np.reshape(origins_of(k, pairs.ravel()), pairs.shape)
+        of_drive = (origins != NOT_ASSIGNED).any(axis=1)
         free = np.r_[free, pairs[of_drive].ravel()]
         pairs[of_drive] = LOST
     for row in lost.tolist():
-        near = _plainly(omega, row, found, free)
+        near = _plain_zero(omega, row, found, free)
         if near is not None:
             pairs[row] = near, near.conjugate()
             free = free[free != near]
     real = single[single.imag == 0].real
     rigid = np.zeros((undamped.index.size - count, 2), complex)
     if single.size and k.at_rest == 1:
-        rigid[:, 1] = np.where(single[0].imag == 0, single[0].real, np.nan)
-        real = real[int(single[0].imag == 0) :]
+        turning = single[0]
+        rigid[:, 1] = np.nan
+        if turning.imag == 0:
+            rigid[:, 1] = turning.real
+            real = real[1:]
     upper = sorted(free[free.imag >= 0].tolist(), key=abs)
     return DampedModes(
         undamped,
@@ -255,7 +256,7 @@ def _searched(undamped: Modes, steps: float, reach: float) -> DampedModes:
     )
 
 
-def _boxed(undamped: Modes, omega: Real, listed: Complex, company: Complex) -> tuple[Box, Complex]:
+def _box_of(undamped: Modes, omega: Real, listed: Complex, company: Complex) -> tuple[Box, Complex]:
     """Return the highest box in which the listed pairs (n, 2) are all eigenvalues, or one that is searched, with all.
 
     `company` are pairs that are not listed, `omega` the undamped frequencies of the list and the next one.
@@ -263,21 +264,24 @@ def _boxed(undamped: Modes, omega: Real, listed: Complex, company: Complex) -> t
     k = undamped.system
     f = function_of(k)
     is_whole = bool(np.isfinite(listed[:, 0]).all())
-    box = complete_box(f, listed, company, k.damping) if is_whole else None
-    if box is not None:
-        return box, listed[box.holds(listed)]
+    below = listed
+    if is_whole:
+        box = complete_box(f, listed, company, k.damping)
+        if box is not None:
+            return box, listed[box.holds(listed)]
+    else:
+        # unknown ones may be above known ones
+        below = listed[:0]
     starts = np.r_[listed.ravel(), company.ravel(), damped_starts(undamped.arm, omega)]
-    # unknown ones may be above known ones
-    below = listed if is_whole else listed[:0]
     return filled_box(f, below, company, float(omega[-2:].mean()), starts, k.damping)
 
 
-def _with_single(single: Complex, pairs: Complex) -> Complex:
-    """Return single eigenvalues (m,), each with NaN as the other, and pairs (n, 2) below them."""
-    return np.concatenate([np.stack([single, np.full(single.size, LOST)], axis=1), pairs])
+def _in_rows(single: Complex | Real) -> Complex:
+    """Return single eigenvalues (m,) as rows (m, 2), each with NaN as the other."""
+    return np.stack([single, np.full(single.size, LOST)], axis=-1)
 
 
-def _plainly(omega: Real, mode: int, found: Complex, free: Complex) -> complex | None:
+def _plain_zero(omega: Real, mode: int, found: Complex, free: Complex) -> complex | None:
     """Return the free zero of a frequency whose distance is small compared with those to all others, else None."""
     start = 1j * omega[mode]
     near = min(free[free.imag > 0].tolist(), key=lambda zero: abs(zero - start), default=None)
@@ -300,6 +304,8 @@ def origins_of(k: System, s: Complex) -> list[str]:
         "back_emf": "back-EMF",
         "lag": "electrical pole",
     }
+    # of a part, for differences: float64 has D to 1e-15 of its terms
+    share = Fraction(1, 10_000)
     parts = [part for part in drive_parts if getattr(k.drive, part)]
     if not parts:
         return [NOT_ASSIGNED] * s.size
@@ -308,11 +314,11 @@ def origins_of(k: System, s: Complex) -> list[str]:
     with np.errstate(invalid="ignore"):
         here = function_of(k)(s)
         for part in parts:
-            larger = k.drive._replace(**{part: getattr(k.drive, part) * (1 + PART_STEP)})
+            larger = k.drive._replace(**{part: getattr(k.drive, part) * (1 + share)})
             there = function_of(replace(k, drive=larger))(s)
             change = there.value * np.exp(there.scale - here.scale) - here.value
             # 0.3: |d ln s/d ln p| of the part p of an eigenvalue's origin: 1/2 for two parts
-            is_large = abs(change / (here.slope * s)) > 0.3 * PART_STEP
+            is_large = abs(change / (here.slope * s)) > 0.3 * share
             for n in np.flatnonzero(is_large).tolist():
                 found[n].append(drive_parts[part])
     return [" and ".join(names) or NOT_ASSIGNED for names in found]
@@ -341,14 +347,18 @@ def missing_real_eigenvalues(damped: DampedModes) -> Real:
         return np.asarray((drive * np.exp(1j * scale.imag)).real)
 
     alone = damped.unassigned_pairs[:, 0]
+    unassigned = alone[alone.imag == 0].real
     overdamped = damped.eigenvalues[damped.is_overdamped].real.ravel()
-    known = np.sort(-np.r_[overdamped, damped.single, alone[alone.imag == 0].real])
+    known = np.sort(-np.r_[overdamped, damped.single, unassigned])
     sides = np.sign(signed(at))
     passed = np.searchsorted(known, -at)
-    new = np.flatnonzero((sides[1:] * sides[:-1] < 0) & (np.diff(passed) == 0))
-    return np.array(
-        [brentq(lambda s: float(signed(np.array([s]))[0]), at[n + 1], at[n], xtol=1e-300) for n in new]
-    )
+    changes = sides[1:] * sides[:-1] < 0
+    new = np.flatnonzero(changes & (np.diff(passed) == 0))
+
+    def value(s: float) -> float:
+        return float(signed(np.array([s]))[0])
+
+    return np.array([brentq(value, at[n + 1], at[n], xtol=1e-300) for n in new])
 
 
 def damped_starts(arm: Arm, omega: Real) -> Complex:

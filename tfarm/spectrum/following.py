@@ -118,13 +118,18 @@ def follow(family: Family, values: Real, start: Complex) -> Complex:
                 good = 1
                 near = assign_roots(family, float(at[0]), guess[0])
                 # no root jumps by half its size
-                found = np.where((abs(near - last) > 0.5 * abs(last)) & (last != 0), np.nan, near)[None]
-        many = min(2 * many, most) if good == len(block) else max(1, good)
+                is_jump = (abs(near - last) > 0.5 * abs(last)) & (last != 0)
+                found = np.where(is_jump, np.nan, near)[None]
+        if good == len(block):
+            many = min(2 * many, most)
+        else:
+            many = max(1, good)
         del ahead[len(ahead) - good :]
         for (value, n), row in zip(block[:good], found[:good], strict=True):
             if n:
                 rows[n] = row
-            past = [*past, (value, np.where(is_over(family, value, row), np.nan, row))][-PAST:]
+            going = np.where(is_over(family, value, row), np.nan, row)
+            past = [*past, (value, going)][-PAST:]
     return rows
 
 
@@ -162,7 +167,8 @@ def interpolate_roots(family: Family, values: Real, rows: Complex, wanted: Real)
         guess = predict_roots(values[near], rows[near], wanted[here], rows[n - 1])
         found[here] = correct_roots(family, wanted[here], guess, rows[n - 1])
         singular = family.singular(wanted[here])
-        for each in here[~which_plain(guess, found[here], rows[n - 1], singular, family.blur).all(axis=1)]:
+        are_plain = which_plain(guess, found[here], rows[n - 1], singular, family.blur)
+        for each in here[~are_plain.all(axis=1)]:
             found[each] = follow(family, np.array([values[n - 1], wanted[each]]), rows[n - 1])[1]
     return found
 
@@ -197,7 +203,8 @@ def nearest(row: Any) -> Any:
         for j in range(row.size):
             distance = abs(row[i] - row[j])
             if j != i and distance < away[i]:
-                index[i], away[i] = j, distance
+                index[i] = j
+                away[i] = distance
     return index, away
 
 
@@ -227,7 +234,8 @@ def predict_roots(at: Any, rows: Any, wanted: Any, base: Any) -> Any:
             weights = np.ones(at.size)
             for k in range(low, at.size):
                 for n in range(low, at.size):
-                    weights[k] *= (wanted[m] - at[n]) / (at[k] - at[n]) if n != k else 1.0
+                    if n != k:
+                        weights[k] *= (wanted[m] - at[n]) / (at[k] - at[n])
             for i in range(base.size):
                 j = partner[i]
                 if j >= i and np.isnan(guess[m, i]):
@@ -248,7 +256,10 @@ def _of_one(weights: Any, first: Any, second: Any, base: Any) -> Any:
     total = 0j
     for k in range(weights.size):
         past = (first[k] + second[k]) * 0.5
-        total += weights[k] * past if (past.imag == 0.0) == (base.imag == 0.0) else LOST
+        if (past.imag == 0.0) == (base.imag == 0.0):
+            total += weights[k] * past
+        else:
+            total += LOST
     return total
 
 
@@ -276,7 +287,8 @@ def correct_roots(family: Family, values: Real, guess: Complex, base: Complex) -
     own = np.arange(base.size)
     partner = couples(np.where(base.imag == 0, base, np.nan))
     partner = np.where(partner < 0, own, partner)
-    lower, upper = np.nonzero((base[:, None] == base.conj()) & (base.imag < 0)[:, None])
+    are_mirrors = base[:, None] == base.conj()
+    lower, upper = np.nonzero(are_mirrors & (base.imag < 0)[:, None])
     partner[lower] = upper
     is_lower = (guess.imag < 0) & (partner != own)
     found = family.near(values, np.where(is_lower, np.nan, guess))
@@ -307,8 +319,8 @@ def which_plain(guess: Any, found: Any, base: Any, singular: Any, blur: float) -
             if base[i].imag != 0.0 and np.all(base != base[i].conjugate()):
                 room = min(room, 2.0 * min(abs(here.imag), abs(base[i].imag)))
             same_side = np.sign(here.imag) == np.sign(guess[m, i].imag)
-            near = same_side and moved <= (2.0 * plain_move if is_couple else plain_move) * away[i]
-            is_plain[m, i] |= moved <= blur or (
-                (near or guess[m, i] == 0.0 or here == 0.0) and moved <= plain_move * room
-            )
+            share = 2.0 * plain_move if is_couple else plain_move
+            near = same_side and moved <= share * away[i]
+            at_zero = guess[m, i] == 0.0 or here == 0.0
+            is_plain[m, i] |= moved <= blur or ((near or at_zero) and moved <= plain_move * room)
     return is_plain

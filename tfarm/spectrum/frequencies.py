@@ -38,10 +38,6 @@ def counts_below(k: System, omega: Real) -> Whole:
     )
 
 
-# of working precision: a root that needs more is double
-MOST_AXIS_BITS = 40_000
-
-
 def real_waves(a: Ball, b: Ball, g: Ball, S: Ball) -> tuple[tuple[Ball, ...], tuple[Ball, ...]]:
     """Return c, sinh t / t, z, v and the scale of both waves at S = -omega^2, which are real."""
     half = S * (a + b) / 2
@@ -71,8 +67,8 @@ def pinned_count(squares: Iterable[Ball]) -> int | None:
             whole = ((-z).sqrt() / flint.arb.pi()).floor().unique_fmpz()
             if whole is None:
                 return None
-            number = number + int(whole)
-            travelling = travelling + 1
+            number += int(whole)
+            travelling += 1
         elif not z > 0:
             return None
     return number + (travelling == 2)
@@ -86,7 +82,8 @@ class AxisSweep(Sweep):
     """The sweep at s = i omega in real balls, with the count: its s is 0, its S is -omega^2."""
 
     def __init__(self, system: System, omega: Ball, counting: bool) -> None:
-        self._counting, self.number = counting, 0
+        self._counting = counting
+        self.number = 0
         self._free = system.free_motions_of_tip
         super().__init__(readings(system), flint.arb(0), -omega * omega)
 
@@ -97,13 +94,13 @@ class AxisSweep(Sweep):
 
     def _plane_inside(self, element: Any, p: SolutionPlane) -> SolutionPlane:
         if isinstance(element, Segment):
-            return self._joined(element, p)
+            return self._across_segment(element, p)
         p = super()._plane_inside(element, p)
         if isinstance(element, Spring):
             self._step(p[0], 1)
         return p
 
-    def _joined(self, element: Any, p: SolutionPlane) -> SolutionPlane:
+    def _across_segment(self, element: Any, p: SolutionPlane) -> SolutionPlane:
         a, b, g, *_ = element
         own = real_waves(a, b, g, self.S)
         l = element.length
@@ -197,9 +194,11 @@ def secant(axis: RealAxis, omega: float, digits: int) -> Ball | None:
 
 def axis_precisions(digits: int) -> Iterator[int]:
     """Yield working precisions [bits] for a number of digits, each twice the one before."""
+    # a root that needs more is double
+    most_bits = 40_000
     # 3.33 and 80: log2 10, rounded up; and beyond the digits, for cancellation
     bits = int(3.33 * digits) + 80
-    while bits < MOST_AXIS_BITS:
+    while bits < most_bits:
         yield bits
         bits *= 2
 
@@ -246,13 +245,13 @@ def list_frequencies(systems: Sequence[System], first: int, last: int) -> None:
     near[:, 1:] = close
     near[:, :-1] |= close
     for j, i in np.argwhere(near):
-        found[j, i] = _separated(systems[j], float(found[j, i]), int(number[i]))
+        found[j, i] = _bisect_in_balls(systems[j], float(found[j, i]), int(number[i]))
     for k, own in zip(systems, read_only(found[:, number.size - 2 - last + first : -1]), strict=True):
         if not np.isnan(own).any():
             k.keep((first, last), own.view)
 
 
-def _separated(k: System, omega: float, number: int) -> float:
+def _bisect_in_balls(k: System, omega: float, number: int) -> float:
     """Return the frequency of that number next to omega, close to another, by the count in balls."""
     # relative width around each of a close pair in float64
     pair_reach = 4e-6
@@ -263,8 +262,12 @@ def _separated(k: System, omega: float, number: int) -> float:
         axis = RealAxis(k)
         while low < (middle := 0.5 * (low + high)) < high:
             below = axis.count(rational(middle))
-            below = count_below(k, middle) if below is None else below
-            low, high = (low, middle) if below >= number else (middle, high)
+            if below is None:
+                below = count_below(k, middle)
+            if below >= number:
+                high = middle
+            else:
+                low = middle
     return high
 
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from tfarm.arm import Arm, Hub, HubFeedback, Payload, Section, input_words, must_be_arm, written_unit
+from tfarm.arm import Arm, Hub, HubFeedback, Payload, Section, input_words, must_be_arm
 from tfarm.errors import require
 from tfarm.spectrum.frequencies import ARMS_KEPT
 from tfarm.spectrum.table import first_frequency
@@ -23,11 +23,6 @@ RATE_SHARE = 6.42e-3
 LEAST_UNITS = 1e-12
 # of J w1, 1 and J w1^2: practically infinite, far from overflow
 MOST_UNITS = 1e9
-# of a default K1
-DEFAULT_DIGITS = 3
-# Section, hub and payload of the paper's arms, with density [kg/m^3] and C [s] as in their presets.
-PAPER_SECTION = Section.general(area=6e-4, second_moment=1.8e-9, shear_factor=5 / 6)
-PAPER_ENDS = Hub(inertia=0.1), Payload()
 
 
 @lru_cache(maxsize=ARMS_KEPT)  # each loop of a search checks its gains
@@ -68,10 +63,12 @@ def check_gains(arm: Arm, law: HubFeedback, least: float = LEAST_UNITS) -> None:
     for name, unit in {"Kp": "J w1^2", "K1": "J w1", "K2": "1"}.items():
         value = law[name]
         own = gain_unit(arm, name)
-        remedy = f"for this arm at most {MOST_UNITS:g} times {unit} in size, {MOST_UNITS * own:.3g}"
-        require(abs(value) <= MOST_UNITS * own, name, value, remedy)
-        remedy = f"for this arm 0, or at least {least:g} times {unit} in size, {least * own:.3g}"
-        require(not value or abs(value) >= least * own, name, value, remedy)
+        most = MOST_UNITS * own
+        remedy = f"for this arm at most {MOST_UNITS:g} times {unit} in size, {most:.3g}"
+        require(abs(value) <= most, name, value, remedy)
+        smallest = least * own
+        remedy = f"for this arm 0, or at least {least:g} times {unit} in size, {smallest:.3g}"
+        require(not value or abs(value) >= smallest, name, value, remedy)
 
 
 def default_gains(arm: Arm) -> HubFeedback:
@@ -83,9 +80,10 @@ def default_gains(arm: Arm) -> HubFeedback:
     must_be_arm(arm)
     if _is_of_the_paper(arm):
         return PAPER_GAINS
-    K1 = float(f"{RATE_SHARE * rate_unit(arm):.{DEFAULT_DIGITS}g}")
-    K2 = float(f"{PAPER_GAINS.K2 * arm.input_per_torque:.{DEFAULT_DIGITS}g}")
-    return HubFeedback(K1=K1, K2=0.0 if arm.has_massless_hub else K2)
+    K1 = float(f"{RATE_SHARE * rate_unit(arm):.3g}")
+    if arm.has_massless_hub:
+        return HubFeedback(K1=K1)
+    return HubFeedback(K1=K1, K2=float(f"{PAPER_GAINS.K2 * arm.input_per_torque:.3g}"))
 
 
 def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
@@ -93,16 +91,21 @@ def default_words(arm: Arm, names: Iterable[str] = ("K1", "K2")) -> str:
     law = default_gains(arm)
     is_paper = _is_of_the_paper(arm)
     why = "as in the paper" if is_paper else f"{RATE_SHARE:g} J w1 of this arm"
-    units = {name: written_unit(name, arm) for name in ("K1", "K2")}
-    words = {"K1": f"K1 = {law.K1:g}{units['K1']} ({why})", "K2": f"K2 = {law.K2:g}{units['K2']}"}
-    driven = f", through {input_words(arm)}" if arm.input_per_torque != 1.0 else ""
-    return " and ".join(words[name] for name in names) + driven
+    words = {name: law.gain_text(name, "{:g}".format, arm) for name in ("K1", "K2")}
+    words["K1"] += f" ({why})"
+    text = " and ".join(words[name] for name in names)
+    if arm.input_per_torque != 1.0:
+        return f"{text}, through {input_words(arm)}"
+    return text
 
 
 def _is_of_the_paper(arm: Arm) -> bool:
     """Whether link, hub and payload are those of one of the paper's presets."""
+    # density [kg/m^3] and C [s]
     paper_materials = ((2766.7, 0.0), (2766.7, 1e-4), (2.7667, 0.0))
+    section = Section.general(area=6e-4, second_moment=1.8e-9, shear_factor=5 / 6)
     link = arm.link
     is_material = (link.density, link.damping) in paper_materials
     is_link = (link.length, link.youngs_modulus, link.shear_modulus) == (1.0, 6.8944e10, 2.6517e10)
-    return is_material and is_link and (link.section, arm.hub, arm.payload) == (PAPER_SECTION, *PAPER_ENDS)
+    is_ended = (arm.hub, arm.payload) == (Hub(inertia=0.1), Payload())
+    return is_material and is_link and is_ended and link.section == section

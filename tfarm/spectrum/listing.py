@@ -129,7 +129,9 @@ class ModeList:
         self,
     ) -> Annotated[str, Quantity("completeness", help="word of certainty for the list of modes")]:
         """The word of certainty for the list of modes."""
-        return "converged (counted)" if self.proof is None else "certified"
+        if self.proof is None:
+            return "converged (counted)"
+        return "certified"
 
     @property
     def box(
@@ -203,33 +205,27 @@ def listed_modes(
     With `certify` each flexible mode has its bracket and its discs, and the list a certified count.  `method` is that
     of the frequencies.  Raises CertificationError where a bracket fails.
     """
-    if not certify:
-        wanted = None
-    elif digits is None:
-        wanted = DOUBLE_DIGITS
-    else:
-        wanted = digits
-    proof = None if wanted is None else found.certify(wanted)
+    certain = DOUBLE_DIGITS if digits is None else digits
+    proof = found.certify(certain) if certify else None
     damped = None
     discs = None
     failure = None
     if not found.arm.is_undamped:
         try:
             damped = damped_modes(found)
-            discs = None if wanted is None else damped.certify(wanted)
+            if certify:
+                discs = damped.certify(certain)
         except (ConvergenceError, CertificationError) as error:
             damped = None
             failure = f"damped modes: {error}"
-    rows = list(_rows(found, digits, method, damped, proof, discs))
-    free = () if damped is None else damped.unassigned
-    enclosed: list[Any] = [None] * len(free)
+    unassigned = [] if damped is None else list(damped.unassigned)
     if discs is not None:
-        enclosed = [tuple(each) for each in discs[len(discs) - len(free) :]]
-    unassigned = [each._replace(discs=disc) for each, disc in zip(free, enclosed, strict=True)]
+        last = discs[len(discs) - len(unassigned) :]
+        unassigned = [each._replace(discs=own) for each, own in zip(unassigned, last, strict=True)]
     return ModeList(
         found=found,
         damped=damped,
-        modes=rows,
+        modes=list(_rows(found, digits, method, damped, proof, discs)),
         unassigned=unassigned,
         method=method,
         digits=digits,
@@ -257,12 +253,14 @@ def _rows(
     if digits is not None and digits > DOUBLE_DIGITS:
         omega = found.digits(digits)
         still = locked.digits(digits)[-locked.flexible.size :]
-    brackets = [(None, None)] * len(found) if proof is None else [*[(None, None)] * rigid, *proof.brackets]
+    brackets: list[Any] = [(None, None)] * len(found)
+    if proof is not None:
+        brackets[rigid:] = proof.brackets
     theories = compare_theories(found)
     sensitivity = found.sensitivity
     enclosures = _discs_by_mode(damped, discs)
     for row in range(len(found)):
-        first, second, ratio = (None, None, None) if damped is None else _damped(damped, row)
+        first, second, ratio = (None, None, None) if damped is None else _damped_numbers(damped, row)
         yield ListedMode(
             index=int(found.index[row]),
             natural_frequency=omega[row],
@@ -282,7 +280,7 @@ def _rows(
         )
 
 
-def _damped(damped: DampedModes, row: int) -> tuple[complex | None, float | None, float | None]:
+def _damped_numbers(damped: DampedModes, row: int) -> tuple[complex | None, float | None, float | None]:
     """Return eigenvalue, second real eigenvalue and damping ratio of a mode, or None."""
     if row >= len(damped.index) or not damped.is_assigned[row]:
         return None, None, None
@@ -301,7 +299,9 @@ def _discs_by_mode(
         return {}
     numbers = damped.index[damped.index > 0].tolist()
     has_friction = damped.single.size > len(damped.others)
-    return dict(zip([*numbers, 0] if has_friction else numbers, map(tuple, discs), strict=False))
+    if has_friction:
+        numbers.append(0)
+    return dict(zip(numbers, map(tuple, discs), strict=False))
 
 
 def beyond_the_box(arm: Arm) -> str:

@@ -23,10 +23,6 @@ from tfarm.spectrum.box import REAL_SHARE, Function, newton
 from tfarm.spectrum.following import LOST, NEWTON_STEPS, SETTLED, follow, polish_roots
 from tfarm.spectrum.table import Modes, modes
 
-# of steps, after which stray branches are lost and the others followed
-HALVINGS = (250, *[80] * 8)
-# starts next to a guess, of it
-AROUND = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])
 # the table of a layout
 NO_OUTPUT = np.empty((0, len(OutputFormula._fields)))
 
@@ -66,7 +62,10 @@ def _newton(s: Any, rows: Any, ends: Any, at_rest: int, singular: Any) -> None:
                 below = found[0, down] * np.exp(found[1, down] - found[1, i]) / at[down] ** at_rest
                 if above != below:
                     move = 2.0 * h[i] * value / (above - below)
-            s[moving[i]] -= move.real if here[i].imag == 0.0 else move
+            if here[i].imag == 0.0:
+                s[moving[i]] -= move.real
+            else:
+                s[moving[i]] -= move
             left[i] = abs(move) - SETTLED * abs(s[moving[i]])
         moving = moving[left > 0.0]
     s[moving] = LOST
@@ -94,7 +93,8 @@ class Damping:
         rows, whole = (each.rows.view((float, len(OF_ELEMENT.split()) + 4)) for each in (still, layout))
         self.rows = rows, whole - rows
         self.ends = still.ends, layout.ends - still.ends
-        self.at_rest, self.points = self.k.at_rest, np.array(self.k.singular)
+        self.at_rest = self.k.at_rest
+        self.points = np.array(self.k.singular)
 
     def near(self, values: Real, guess: Complex) -> Complex:
         """Return the roots next to the guesses (see `Family`)."""
@@ -104,8 +104,8 @@ class Damping:
             self.most_halvings = min(self.most_halvings, 8)
         units = (values * self.level)[:, None]
         found = guess / units
-        (rows, of_rows) = self.rows
-        (ends, of_ends) = self.ends
+        rows, of_rows = self.rows
+        ends, of_ends = self.ends
         # as those of a layout are
         rows = read_only((rows + values[:, None, None] * of_rows).view(ROW)[..., 0])
         ends = read_only(ends + values[:, None] * of_ends)
@@ -115,9 +115,11 @@ class Damping:
 
     def complete(self, value: float, guess: Complex) -> Complex:
         """Return the roots next to the guesses, with mirror images for guesses below the real axis."""
+        # starts next to a guess, of it
+        shares = np.array([1, 1.02, 0.98, 1 + 0.02j, 1 - 0.02j, 1.2, 0.8, 1 + 0.2j, 1 - 0.2j])
         unit = value * self.level
         wanted = guess[~np.isnan(guess)]
-        starts = np.outer(wanted[wanted.imag >= 0] / unit, AROUND).ravel()
+        starts = np.outer(wanted[wanted.imag >= 0] / unit, shares).ravel()
         with np.errstate(all="ignore"):
             found = newton(function_of(self.k.with_damping(value)), starts) * unit
         # the imaginary part of a double zero is rounding
@@ -125,7 +127,8 @@ class Damping:
         upper = found[found.imag > 0]
         lower = wanted[wanted.imag < 0].conj()
         away = abs(upper[:, None] - lower).min(axis=1, initial=np.inf)
-        return np.r_[found[found.imag >= 0], upper[away < abs(AROUND[-1] - 1) * abs(upper)].conj()]
+        mirrors = upper[away < abs(shares[-1] - 1) * abs(upper)].conj()
+        return np.r_[found[found.imag >= 0], mirrors]
 
     def singular(self, values: Real) -> Real:
         """Return -1/C of the damped segments in these units."""
@@ -135,9 +138,13 @@ class Damping:
 def single_zeros(undamped: Modes, share: float = 1.0) -> list[float]:
     """Return the real eigenvalues [1/s] of no flexible mode, with a share of the damping: -b/J, and -R/L_a."""
     k = undamped.system
-    friction = float((k.drive.friction + k.drive.back_emf) * k.EI / k.length)
-    turning = [-share * friction / undamped.arm.total_inertia] if k.at_rest == 1 else []
-    return turning + ([-1.0 / float(k.drive.lag)] if k.drive.lag else [])
+    found = []
+    if k.at_rest == 1:
+        friction = float((k.drive.friction + k.drive.back_emf) * k.EI / k.length)
+        found.append(-share * friction / undamped.arm.total_inertia)
+    if k.drive.lag:
+        found.append(-1.0 / float(k.drive.lag))
+    return found
 
 
 def name_eigenvalues(undamped: Modes, count: int, steps: float) -> tuple[Complex, Complex]:
@@ -151,11 +158,12 @@ def name_eigenvalues(undamped: Modes, count: int, steps: float) -> tuple[Complex
     alone = single_zeros(undamped)
     if k.is_undamped:
         return np.array(alone, complex), 1j * np.outer(omega, [1, -1])
-    family = Damping(k, k.damping or 1.0, HALVINGS[0], steps)
-    is_elastic = replace(
-        k, elements=tuple(each for each in k.elements if not isinstance(each, Segment))
-    ).is_undamped
-    sizes = [omega[-1] * k.damping, *(abs(each) / omega[0] for each in alone), 0.0 if is_elastic else 1.0]
+    # of steps, after which stray branches are lost and the others followed
+    halvings = (250, *[80] * 8)
+    family = Damping(k, k.damping or 1.0, halvings[0], steps)
+    joints = tuple(each for each in k.elements if not isinstance(each, Segment))
+    is_damped = not replace(k, elements=joints).is_undamped
+    sizes = [omega[-1] * k.damping, *(abs(each) / omega[0] for each in alone), float(is_damped)]
     # so small that an eigenvalue is close to its undamped value
     share = min(1.0, 1e-3 / max(sizes))
     guess = share * family.level * np.r_[single_zeros(undamped, share), 1j * omega]
@@ -163,23 +171,25 @@ def name_eigenvalues(undamped: Modes, count: int, steps: float) -> tuple[Complex
     start = np.r_[single, np.stack([upper, upper.conj()], axis=1).ravel()]
     # three decades at a time, which scale the shortest step
     ends = np.geomspace(share, 1.0, 1 + math.ceil(-math.log10(share) / 3))[1:].tolist()
-    for family.most_halvings in HALVINGS:
+    for family.most_halvings in halvings:
         try:
             while ends:
                 start = follow(family, np.array([share, ends[0]]), start)[1]
                 share = ends.pop(0)
             break
         except ConvergenceError as lost:
-            (share, start) = lost.best
-            stray = lost.residual
-            start = np.where(stray, LOST, start)
-    found = np.full(start.size, LOST) if ends else polish_roots(function_of(k), start / family.level)
+            share, start = lost.best
+            start = np.where(lost.residual, LOST, start)
+    if ends:
+        found = np.full(start.size, LOST)
+    else:
+        found = polish_roots(function_of(k), start / family.level)
     # of lost ones
     with np.errstate(invalid="ignore"):
         # so far out that Newton's method converges anywhere
         found[~has_slope(k, found)] = LOST
-    again = np.triu(abs(found[:, None] - found) <= REAL_SHARE * abs(found), 1).any(axis=0)
-    found[again] = LOST
+    is_same = abs(found[:, None] - found) <= REAL_SHARE * abs(found)
+    found[np.triu(is_same, 1).any(axis=0)] = LOST
     return in_pairs(found[: len(alone)], found[len(alone) :].reshape(-1, 2))
 
 
@@ -196,14 +206,18 @@ def in_pairs(single: Complex, pairs: Complex) -> tuple[Complex, Complex]:
         if rings.size == 1:
             one = pairs[n, rings[0]]
             rest = pairs[n, 1 - rings[0]]
-            alone, other = (abs(each - one.conj()) <= REAL_SHARE * abs(one) for each in (single, pairs))
-            pairs[n] = one, one.conj()
+            mirror = one.conj()
+            alone, other = (abs(each - mirror) <= REAL_SHARE * abs(one) for each in (single, pairs))
+            pairs[n] = one, mirror
             if other.any():
                 m, place = np.argwhere(other)[0]
                 pairs[m] = rest, pairs[m, 1 - place]
-                pairs[[min(n, m), max(n, m)]] = pairs[[m, n]]
+                order = sorted((n, m))
+                pairs[order] = pairs[[m, n]]
             elif alone.any():
                 single[alone] = rest
-    slower = ~(abs(pairs[:, 0]) > abs(pairs[:, 1])) & ~np.isnan(pairs[:, 0])
-    first = np.where((pairs.imag > 0).any(axis=1), pairs[:, 0].imag > 0, slower)
-    return single, np.where(first[:, None], pairs, pairs[:, ::-1])
+    first, second = pairs.T
+    is_slower = ~(abs(first) > abs(second)) & ~np.isnan(first)
+    is_upper = pairs.imag > 0
+    is_first = np.where(is_upper.any(axis=1), is_upper[:, 0], is_slower)
+    return single, np.where(is_first[:, None], pairs, pairs[:, ::-1])

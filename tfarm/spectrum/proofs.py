@@ -43,9 +43,6 @@ from tfarm.schema import Quantity
 from tfarm.spectrum.box import Box
 from tfarm.spectrum.frequencies import RealAxis, axis_precisions, secant
 
-# of a gap: tried in turn
-COUNTED_AT = tuple(Fraction(*share) for share in ((1, 2), (2, 5), (3, 5), (1, 7), (6, 7)))
-
 
 @frozen(slots=True)
 class Certificate:
@@ -85,7 +82,9 @@ def _bracket(k: System, omega: float, digits: int) -> tuple[Fraction, Fraction]:
 
     def attempt() -> tuple[Fraction, Fraction] | None:
         root = secant(axis, omega, digits)
-        number = None if root is None else (root / rational(unit)).floor().unique_fmpz()
+        if root is None:
+            return None
+        number = (root / rational(unit)).floor().unique_fmpz()
         if number is None:
             return None
         lower = int(number) * unit
@@ -104,14 +103,18 @@ def _count_above(k: System, last: Fraction, above: float) -> tuple[int, str]:
     """Return a certified count between the last bracket and the next frequency, and its frequency."""
     # of working precision there: a count is certain unless it is on a half wave
     counting_bits = (128, 512, 4096)
+    axis = RealAxis(k)
     gap = Fraction(above) - last
-    for share in COUNTED_AT:
-        point = Fraction(float(last + gap * share))
+    # shares of the gap
+    for share in ("1/2", "2/5", "3/5", "1/7", "6/7"):
+        point = Fraction(float(last + gap * Fraction(share)))
+        if point <= last:
+            continue
         for bits in counting_bits:
             with precision(bits):
-                count = RealAxis(k).count(rational(point)) if point > last else None
-                if count is not None:
-                    return count, repr(float(point))
+                count = axis.count(rational(point))
+            if count is not None:
+                return count, repr(float(point))
     raise CertificationError(f"no certified count between {float(last):.10g} and {above:.10g} rad/s")
 
 
@@ -121,10 +124,6 @@ def _text(value: Fraction) -> str:
     most_decimals = 20_000
     with localcontext(prec=most_decimals):
         return f"{Decimal(value.numerator) / value.denominator:f}"
-
-
-# of one side of a contour, some 10 s of CPU time; the presets need up to 2,000
-MOST_PIECES = 6000
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,10 +140,11 @@ class Disc:
         return float(self.im) == 0
 
 
-def proven_count(k: System, box: Box, law: Feedback | None = None) -> int:
+def proven_count(k: System, box: Box, law: Feedback | None = None, *, most_pieces: int = 6000) -> int:
     """Return the certified number of zeros of D in a box symmetric about the real axis, with multiplicity.
 
-    Zeros at s = 0 are included.  Raises CertificationError where a zero is too near the contour, for too many pieces,
+    Zeros at s = 0 are included.  Each side of the contour has at most `most_pieces`, some 10 s of CPU time; the presets
+    need up to 2,000.  Raises CertificationError where a zero is too near the contour, for too many pieces,
     and with -1/C inside.
     """
     if k.damping and box.re_min <= -1.0 / k.damping:
@@ -157,14 +157,14 @@ def proven_count(k: System, box: Box, law: Feedback | None = None) -> int:
     with precision(96):
         turned = flint.arb(0)
         for a, b in pairwise(corners):
-            turned += _turning(k, law, point(a), point(b))
+            turned += _argument_change(k, law, point(a), point(b), most_pieces)
         number = (turned / flint.arb.pi()).unique_fmpz()
     if number is None:
         raise CertificationError("the change of arg D around the box is no certain multiple of pi")
     return int(number)
 
 
-def _turning(k: System, law: Feedback | None, a: Ball, b: Ball) -> Ball:
+def _argument_change(k: System, law: Feedback | None, a: Ball, b: Ball, most_pieces: int) -> Ball:
     """Return the change of arg D along the side from a to b."""
     # 1 / 32 of a side of the contour, before adaptation: time alone
     total = flint.arb(0)
@@ -178,9 +178,9 @@ def _turning(k: System, law: Feedback | None, a: Ball, b: Ball) -> Ball:
         there = (a + (b - a) * end).mid()
         over = characteristic_over(k, here.union(there), law)
         pieces += 1
-        if pieces > MOST_PIECES:
+        if pieces > most_pieces:
             raise CertificationError(
-                f"the edge of the box needs more than {MOST_PIECES} pieces: certify a shorter list"
+                f"the edge of the box needs more than {most_pieces} pieces: certify a shorter list"
             )
         if not over.is_finite() or over.contains(0):
             step /= 2
@@ -190,11 +190,11 @@ def _turning(k: System, law: Feedback | None, a: Ball, b: Ball) -> Ball:
             continue
         end_value = characteristic_over(k, there, law)
         total += (end_value / value).log().imag
-        # 1.125 of a step after a good one; tuned: with 2 every second step was too long
         start = end
         here = there
         value = end_value
-        step = 1.125 * step
+        # after a good one; tuned: with 2 every second step was too long
+        step *= 1.125
     return total
 
 
@@ -212,9 +212,11 @@ def enclose_zero(k: System, near: complex, digits: int, law: Feedback | None = N
         unit = Fraction(10) ** exponent
         exact = (exact_middle(part) for part in (middle.real, middle.imag))
         re, im = (round(Fraction(int(part.p), int(part.q)) / unit) for part in exact)
-        is_proven = _holds_one(k, law, flint.acb(rational(re * unit), rational(im * unit)), rational(unit))
+        centre = flint.acb(rational(re * unit), rational(im * unit))
+        if not _holds_one(k, law, centre, rational(unit)):
+            return None
         re_text, im_text = (f"{Decimal(f'{number}E{exponent}'):f}" for number in (re, im))
-        return Disc(re_text, im_text, f"{float(unit):.0e}") if is_proven else None
+        return Disc(re_text, im_text, f"{float(unit):.0e}")
 
     text = f"no certified disc of {digits} digits around {near:.12g} 1/s: a double zero, or close to one"
     return first_success(axis_precisions(digits), attempt, CertificationError(text))
@@ -230,7 +232,8 @@ def _newton(k: System, law: Feedback | None, near: complex, digits: int) -> Ball
             return None
         move = (parts[0] / parts[1]).mid()
         s = (s - move).mid()
-        s = flint.acb(s.real) if near.imag == 0 else s
+        if near.imag == 0:
+            s = flint.acb(s.real)
         # 3 digits of its convergence beyond those of the disc
         if abs(move) < abs(s) * rational(Fraction(1, 10 ** (digits + 3))):
             return s
@@ -249,6 +252,4 @@ def _holds_one(k: System, law: Feedback | None, m: Ball, r: Ball) -> bool:
 def disjoint(discs: Sequence[Disc]) -> bool:
     """Whether no two discs touch."""
     parts = [(Fraction(d.re), Fraction(d.im), Fraction(d.radius)) for d in discs]
-    return all(
-        (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 > (a[2] + b[2]) ** 2 for a, b in combinations(parts, 2)
-    )
+    return all((x - u) ** 2 + (y - v) ** 2 > (r + q) ** 2 for (x, y, r), (u, v, q) in combinations(parts, 2))

@@ -1,4 +1,4 @@
-"""Mode shapes: the free response at the natural frequencies, in float64, of unit modal mass; exact sensitivities.
+"""Mode shapes: the free response at the natural frequencies, in float64, of unit modal mass.
 
 At an eigenvalue the state with W = 0 on the axis is in the plane of the payload's states everywhere along the link.  So
 the sweeps of the response have the states at both ends of every segment.  Between them each wave is the sum of one
@@ -9,36 +9,21 @@ decaying from the inner end and one decaying from the outer end,
 with W_j' = z_j s_j, so that nothing grows or cancels.  For slow segments the transition functions are used.  At a
 double frequency the whole plane satisfies both conditions of the hub.  Two other conditions determine two modes, which
 are made orthogonal in the modal mass.
-
-The sensitivities d ln w/d ln p are exact, from the energies of the mode.  Rayleigh's quotient w^2 = V/T is stationary
-at a mode, so for a parameter p of the energies
-
-    2 d ln w/d ln p = (dV/d ln p - w^2 dT/d ln p)/V
-
-with constant fields.  With constant functions of x/l, the term of a piece's length l is  -2 P l/V,  where
-
-    P = M^2/(2 EI) + Q^2/(2 kappa G A) + Q Psi + w^2 (rhoA W^2 + rhoI Psi^2)/2
-
-is constant along a uniform piece, its energy-momentum (Eshelby 1951).  A rigid piece (the hub's radius, the payload's
-offset) has P = Q Psi.  An attachment that moves outwards lengthens the piece inside of it.
-
-In these functions energies are shares of those of the mode: potential and kinetic ones sum to 1 each.
 """
 
 from __future__ import annotations
 
 import math
-from bisect import bisect
 from collections.abc import Iterator
 from copy import copy
 from fractions import Fraction
 from itertools import accumulate, pairwise
+from operator import mul
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import Arm
 from tfarm.arrays import LEAST_SIZE, Complex, Real, Whole
 from tfarm.errors import ConvergenceError
 from tfarm.exact.characteristic import characteristic
@@ -52,12 +37,7 @@ from tfarm.records import read_only
 _rows = python_of(transition_rows)
 _series = python_of(transition_series)
 
-# relative gap under which rounding would leave two modes not quite orthogonal
-CLOSE_MODES = 1e-5
-# times modes, each of 4 kB: memory alone
-PANELS_AT_ONCE = 2**13
 AT_HUB = Place(Fraction(0), "inner")
-AT_TIP = Place(Fraction(1))
 
 
 class Shapes:
@@ -67,10 +47,14 @@ class Shapes:
     of its outer side.  Raises ConvergenceError for a mode without a shape.
     """
 
+    # relative gap under which rounding would leave two modes not quite orthogonal
+    close_gap = 1e-5
+
     def __init__(self, system: System, omega: Real) -> None:
         # relative gap under which two frequencies are one, with two modes
         double = 1e-15
-        self.system, self.omega = system, omega
+        self.system = system
+        self.omega = omega
         self._segments = list(reversed(system.segments))
         joints = list(accumulate((each.length for each in self._segments), initial=Fraction(0)))
         self._ends = [
@@ -83,16 +67,19 @@ class Shapes:
         gap = np.r_[np.inf, np.diff(omega) / omega[1:], np.inf]
         is_first = gap[1:] < double
         is_second = gap[:-1] < double
-        close = np.minimum(gap[1:], gap[:-1]) < CLOSE_MODES
+        close = np.minimum(gap[1:], gap[:-1]) < self.close_gap
         conditions = self._conditions()
         left = np.array([self._at_axis(axis) for axis in conditions[:2]])
         # the larger one
         best = (abs(left[1]).max(axis=0) > abs(left[0]).max(axis=0)).astype(int)
         Psi, M, Q = np.where(best, left[1], left[0])
-        own = np.array([Q, -Psi if system.drive.turns else -M])
+        opposite = Psi if system.drive.turns else M
+        own = np.array([Q, -opposite])
         own = np.where(is_first, [[1.0], [0.0]], np.where(is_second, [[0.0], [1.0]], own))
-        self._factors = np.concatenate([np.where(close, own, [[1.0], [0.0]]), np.zeros((2, omega.size))])
-        axes = [np.where(close, conditions[2], np.where(best, conditions[1], conditions[0])), conditions[3]]
+        factors = np.where(close, own, [[1.0], [0.0]])
+        self._factors = np.concatenate([factors, np.zeros((2, omega.size))])
+        single = np.where(best, conditions[1], conditions[0])
+        axes = [np.where(close, conditions[2], single), conditions[3]]
         self._axes = np.array([*axes, *np.roll(axes, 1, axis=-1)])
         self._omegas = np.array([omega, omega, np.roll(omega, 1), np.roll(omega, 1)])
         # a cut system has other scales
@@ -121,22 +108,25 @@ class Shapes:
         return part
 
     def blocks(self) -> Iterator[Shapes]:
-        """Yield blocks of neighbouring modes with at most `PANELS_AT_ONCE` panels."""
+        """Yield blocks of neighbouring modes with a bounded number of panels times modes."""
+        # each of 4 kB: memory alone
+        most_panels = 2**13
         first = 0
         while first < self.omega.size:
             # 4 modes; each next block has twice as many: time alone
-            last = min(2 * first + 4, self.omega.size)
-            while (
-                last > first + 1
-                and (last - first) * sum(self.part(slice(first, last))._counts) > PANELS_AT_ONCE
-            ):
-                last = (first + last) // 2
-            yield self.part(slice(first, last))
-            first = last
+            block = self.part(slice(first, 2 * first + 4))
+            while block.omega.size > 1 and block.omega.size * sum(block._counts) > most_panels:
+                block = block.part(slice(block.omega.size // 2))
+            yield block
+            first += block.omega.size
 
     def tip(self) -> Real:
         """Return W, Psi, M, Q of each mode at the tip, (4, modes)."""
-        return self.states((AT_TIP,))[0][..., 0]
+        return self.states((Place(Fraction(1)),))[0][..., 0]
+
+    def root(self) -> Real:
+        """Return W, Psi, M, Q of each mode at the hub's end of the link, (4, modes)."""
+        return self.states((AT_HUB,))[0][..., 0]
 
     def theta(self) -> Real:
         """Return the hub angle of each mode, 0 of a locked hub.
@@ -148,17 +138,17 @@ class Shapes:
             return np.zeros(self.omega.size)
         fields, theta = self.states((AT_HUB,))
         _, _, M, Q = fields[..., 0]
-        A = float(drive.stiffness) - float(drive.inertia) * self.omega**2
+        A = self._hub_balance()
         heavy = abs(A) > 1.0
         return np.where(heavy, (M + float(self.system.radius) * Q) / np.where(heavy, A, 1.0), theta)
 
     def masses(self) -> Real:
         """Return the modal masses."""
-        return np.sum([weight @ motion**2 for weight, motion in self._moving()], axis=0)
+        return np.sum([weight @ motion**2 for weight, motion in self._inertias()], axis=0)
 
     def mass_matrix(self) -> Real:
         """Return modal masses (diagonal) and products of different modes, in EI/L: the identity to rounding."""
-        return np.asarray(sum((motion.T * weight) @ motion for weight, motion in self._moving()))
+        return np.asarray(sum((motion.T * weight) @ motion for weight, motion in self._inertias()))
 
     def states(self, places: tuple[Place, ...]) -> tuple[Real, Real]:
         """Return W, Psi, M, Q (fields, modes, places) and the hub angle (modes,)."""
@@ -204,9 +194,14 @@ class Shapes:
         _, _, M, Q = fields[..., 0]
         return np.array([theta, M + float(self.system.radius) * Q, Q]).real
 
+    def _hub_balance(self) -> Real:
+        """Return A (modes,) of the hub's balance A theta = M, of its inertia and spring."""
+        drive = self.system.drive
+        return float(drive.stiffness) - float(drive.inertia) * self.omega**2
+
     def _conditions(self) -> Real:
         """Return conditions (4, 4, modes) on the axis: W = 0, the balance A Psi = M, and two for close modes."""
-        A = float(self.system.drive.stiffness) - float(self.system.drive.inertia) * self.omega**2
+        A = self._hub_balance()
         none = 0 * self.omega
         units = np.eye(4)[:, :, None] + none
         size = np.maximum(abs(A), 1.0)
@@ -235,25 +230,25 @@ class Shapes:
             result[:, modes] += _of_segment(self._segments[number], omega, states, x[modes])
         return result
 
-    def _moving(self) -> list[tuple[Real, Real]]:
+    def _inertias(self) -> list[tuple[Real, Real]]:
         """Return inertias (n,) and their motions (n, modes): along the segments, of bodies, payload and hub."""
         system = self.system
         parts = []
         for piece, weights, (W, Psi, _, _) in self.panels():
             parts.append((float(piece.g * piece.stiffness / piece.length**4) * weights, W.T))
             parts.append((float(piece.a * piece.stiffness / piece.length**2) * weights, Psi.T))
+        single: list[tuple[Any, Real]] = []
         for share, body in self._bodies():
             W, Psi = self.states((Place(share, "inner"),))[0][:2, :, 0]
-            parts += [(np.array([float(body.mass)]), W[None]), (np.array([float(body.inertia)]), Psi[None])]
+            single += [(body.mass, W), (body.inertia, Psi)]
         W, Psi, *_ = self.tip()
-        ends = (
-            (system.tip_mass, W + float(system.offset) * Psi),
-            (system.tip_inertia, Psi),
-            (system.drive.inertia, self.theta()),
-        )
-        return parts + [
-            (np.array([float(size)]), motion[None]) for size, motion in ends if math.isfinite(size)
-        ]
+        single += [(system.tip_mass, W + float(system.offset) * Psi), (system.tip_inertia, Psi)]
+        single.append((system.drive.inertia, self.theta()))
+        for size, motion in single:
+            # an infinite one rests
+            if math.isfinite(size):
+                parts.append((np.array([float(size)]), motion[None]))
+        return parts
 
     def _bodies(self) -> Iterator[tuple[Fraction, Body]]:
         """Yield the place and each body."""
@@ -276,10 +271,11 @@ class Shapes:
         if lost.any():
             worst = float(self.omega[lost][0])
             raise ConvergenceError(f"the mode at {worst:.10g} rad/s has no shape", worst, 0.0)
-        for lower in map(int, np.flatnonzero(np.diff(self.omega) < CLOSE_MODES * self.omega[1:])):
+        for lower in map(int, np.flatnonzero(np.diff(self.omega) < self.close_gap * self.omega[1:])):
+            upper = lower + 1
             overlap = self.part(slice(lower, lower + 2)).mass_matrix()[0, 1]
-            self._factors[2:, lower + 1] = -overlap * self._factors[:2, lower]
-            self._factors[:, lower + 1] /= math.sqrt(self.part(slice(lower + 1, lower + 2)).masses()[0])
+            self._factors[2:, upper] = -overlap * self._factors[:2, lower]
+            self._factors[:, upper] /= math.sqrt(self.part(slice(upper, upper + 1)).masses()[0])
         tip = self.tip()
         theta = self.theta()
         turned = np.where(abs(tip[1]) > no_motion * abs(theta), tip[1], theta)
@@ -292,8 +288,8 @@ def _of_segment(segment: Segment, omega: Real, ends: Real, x: Real) -> Real:
     numbers = np.empty((2, 3, omega.size), complex)
     result = np.empty((4, *x.shape))
     fill_wave_numbers(1j * omega, read_only(np.array([kernel_row(segment)], ROW)), numbers)
-    units = [float(each) for each in segment.units]
-    own = np.array([units[0], 1.0, *units[1:]])[:, None]
+    of_W, *others = [float(each) for each in segment.units]
+    own = np.array([of_W, 1.0, *others])[:, None]
     inner = ends[..., 0] * own
     outer = ends[..., 1] * own
     low = abs(numbers[:, 0]).max(axis=0) < SERIES_RADIUS
@@ -318,8 +314,7 @@ def _by_series(segment: Segment, omega: Real, inner: Real, x: Real) -> Real:
     F0, F1, F2, F3, _, _ = _series(S * (a + b) * x**2, S * (a * b * S + g) * x**4)
     rows = _rows((x**3 * F0, x**2 * F1, x * F2, F3), S, 1.0, k)
     state = (inner * outwards)[..., None]
-    carried = [sum(entry * part for entry, part in zip(row, state, strict=True)) for row in rows]
-    return np.array(carried) * outwards[..., None]
+    return np.array([sum(map(mul, row, state)) for row in rows]) * outwards[..., None]
 
 
 def _by_waves(segment: Segment, omega: Real, numbers: Complex, inner: Real, outer: Real, x: Real) -> Real:
@@ -343,17 +338,19 @@ def _wave(z: Real, k: Real, ends: list[tuple[Real, Real]], x: Real) -> tuple[Rea
     """Return W_j and s_j (modes, n) of a wave with real z = -k^2 or k^2, from those (modes,) at both ends."""
     z = z[:, None]
     k = np.maximum(k, LEAST_SIZE)[:, None]
-    (W0, s0), (W1, s1) = ((each[:, None] for each in end) for end in ends)
+    (W0, s0), (W1, s1) = np.array(ends)[..., None]
     wave, slope = np.empty((2, *x.shape))
     for kind, even, odd in ((z < 0, np.cos, np.sin), ((z >= 0) & (z < 1), np.cosh, np.sinh)):
         rows = kind[:, 0]
         c = even(k[rows] * x[rows])
         s = odd(k[rows] * x[rows]) / k[rows]
-        wave[rows], slope[rows] = W0[rows] * c + (z * s0)[rows] * s, s0[rows] * c + W0[rows] * s
+        wave[rows] = W0[rows] * c + (z * s0)[rows] * s
+        slope[rows] = s0[rows] * c + W0[rows] * s
     rows = z[:, 0] >= 1
     from_inner = ((W0 - k * s0)[rows] / 2) * np.exp(-k[rows] * x[rows])
     from_outer = ((W1 + k * s1)[rows] / 2) * np.exp(-k[rows] * (1 - x[rows]))
-    wave[rows], slope[rows] = from_inner + from_outer, (from_outer - from_inner) / k[rows]
+    wave[rows] = from_inner + from_outer
+    slope[rows] = (from_outer - from_inner) / k[rows]
     return wave, slope
 
 
@@ -379,7 +376,8 @@ def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> 
     # the balance of a heavy hub, for the digits of M
     if abs(A) > abs(B) > 0:
         theta = M * B / A
-    product = complex(slope * (theta / B if k.drive.turns else M))
+    motion = theta / B if k.drive.turns else M
+    product = complex(slope * motion)
     if product == 0 or not np.isfinite(product):
         raise ConvergenceError(f"the mode at {s:.6g} 1/s is double, or the hub is at a node of it", s, slope)
     values = fields[("W", "Psi", "M").index(quantity), 0, :-1]
@@ -387,146 +385,8 @@ def mode_field(k: System, s: complex, quantity: str, x: NDArray[np.float64]) -> 
         damping = [segment_at(k, each).damping for each in places]
         values = values / (1.0 + s * np.array(damping))
     unit = np.sqrt(2 * s / product * float(k.length / k.EI))
-    tip = fields[0 if isinstance(k.tip_mass, Fraction) else 1, 0, -2]
-    return np.asarray((-unit if (unit * tip).real < 0 else unit) * values[:-1], dtype=complex)
-
-
-# 2 d ln w/d ln p of each mode (modes,)
-Doubled = dict[str, Real]
-
-LINK = ("length", "density", "youngs_modulus", "shear_modulus", "shear_factor", "area", "second_moment")
-# of every arm; a rig has more
-PARAMETERS = (*LINK, "hub_inertia", "payload_mass", "payload_inertia")
-
-
-def sensitivities(arm: Arm, shapes: Shapes) -> dict[str, Real]:
-    """Return d ln w/d ln p of the arm's parameters, by parameter, for each mode of `shapes`.
-
-    All arms have those of link (all segments together), hub and payload; others "segment_1_length", ... of each
-    segment, "attachment_1_x", ... and those of springs, rotor and offsets.  Attachments move with a length.
-    """
-    parts = [_of_modes(arm, part) for part in shapes.blocks()]
-    return {name: np.concatenate([each[name] for each in parts]) / 2 + 0.0 for name in parts[0]}
-
-
-def _of_modes(arm: Arm, shapes: Shapes) -> Doubled:
-    # from the hub outwards
-    ends = list(accumulate(Fraction(link.length) / shapes.system.length for link in arm.links))
-    totals = [np.zeros((5, shapes.omega.size)) for _ in arm.links]
-    start = Fraction(0)
-    for piece, weight, fields in shapes.panels():
-        terms = _densities(piece, shapes.omega[:, None], *fields)
-        totals[bisect(ends, start)] += np.array([term @ weight for term in terms])
-        start += piece.length
-    segments = [_of_link(*total) for total in totals]
-    found = {name: np.sum([each[name] for each in segments], axis=0) for name in LINK}
-    found |= _hub(arm, shapes) | _payload(arm, shapes)
-    for number, each in enumerate(segments if len(segments) > 1 else (), start=1):
-        found |= {f"segment_{number}_{name}": values for name, values in each.items()}
-    for number in range(len(arm.attachments)):
-        found |= {
-            f"attachment_{number + 1}_{name}": values for name, values in _attachment(arm, shapes, number)
-        }
-    return found
-
-
-def _of_link(bend: Real, shear: Real, slide: Real, move: Real, turn: Real) -> Doubled:
-    """Return those of a link from its energies; `slide` is the integral of Q W', twice the work of the shear force."""
-    return {
-        "length": -bend + shear - 2 * slide - move - turn,
-        "density": -move - turn,
-        "youngs_modulus": bend,
-        "shear_modulus": shear,
-        "shear_factor": shear,
-        "area": shear - move,
-        "second_moment": bend - turn,
-    }
-
-
-def _densities(piece: Segment, omega: Any, W: Any, Psi: Any, M: Any, Q: Any) -> tuple[Any, ...]:
-    """Return energies of a piece, as in `_of_link`, per length."""
-    length = float(piece.length)
-    stiffness = float(piece.stiffness)
-    square = omega**2
-    # W' = Psi + slip Q
-    slip = float(piece.sigma) * length**2 / stiffness
-    bend = M**2 / stiffness / square
-    shear = slip * Q**2 / square
-    slide = Q * (Psi + slip * Q) / square
-    return (
-        bend,
-        shear,
-        slide,
-        float(piece.g) * stiffness / length**4 * W**2,
-        float(piece.a) * stiffness / length**2 * (Psi**2),
-    )
-
-
-def _hub(arm: Arm, shapes: Shapes) -> Doubled:
-    """Return those of hub, rotor, clamp and joint; behind the clamp the rotation is Psi - M/k, at the joint theta."""
-    chain = shapes.system
-    hub = arm.hub
-    square = shapes.omega**2
-    per_rotation = float(chain.length / chain.EI)
-    turning = per_rotation * shapes.theta() ** 2
-    _, Psi, M, Q = shapes.states((AT_HUB,))[0][..., 0]
-    found = {"hub_inertia": -(0.0 if arm.is_locked else hub.inertia) * turning}
-    if not arm.clamp.is_rigid:
-        bent = M / (arm.clamp.stiffness * per_rotation)
-        found["clamp_stiffness"] = M * bent / square
-        Psi = Psi - bent
-    if hub.radius:
-        found["hub_radius"] = -2 * float(chain.radius) * Q * Psi / square
-        M = M + float(chain.radius) * Q
-    if not arm.joint.is_rigid:
-        found["joint_stiffness"] = M**2 / (arm.joint.stiffness * per_rotation) / square
-    if hub.stiffness:
-        found["hub_stiffness"] = hub.stiffness * turning / square
-    if arm.motor is not None and arm.motor.rotor_inertia:
-        rotor = -arm.motor.reflected_inertia * turning
-        found |= {"rotor_inertia": rotor, "gear_ratio": 2 * rotor}
-    return found
-
-
-def _payload(arm: Arm, shapes: Shapes) -> Doubled:
-    """Return those of the payload, with the displacement W + e Psi."""
-    chain = shapes.system
-    square = shapes.omega**2
-    W, Psi, _, Q = shapes.tip()
-    motions = (("mass", chain.tip_mass, W + float(chain.offset) * Psi), ("inertia", chain.tip_inertia, Psi))
-    found = {
-        f"payload_{name}": -float(size if math.isfinite(size) else 0) * motion**2
-        for name, size, motion in motions
-    }
-    if arm.payload.offset:
-        found["payload_offset"] = -2 * float(chain.offset) * Q * Psi / square
-    return found
-
-
-def _attachment(arm: Arm, shapes: Shapes, number: int) -> Iterator[tuple[str, Real]]:
-    """Yield those of an attachment; also of its place, where the link is uniform around it and has no other there."""
-    each = arm.attachments[number]
-    chain = shapes.system
-    square = shapes.omega**2
-    share = min(Fraction(each.x) / chain.length, Fraction(1))
-    sides = Place(share, "inner"), Place(share, "outer")
-    inner, outer = shapes.states(sides)[0].transpose(2, 0, 1)
-    per_motion = float(chain.length**3 / chain.EI)
-    per_rotation = float(chain.length / chain.EI)
-    joints = list(accumulate((Fraction(link.length) for link in arm.links), initial=Fraction(0)))
-    if Fraction(each.x) not in joints and sum(other.x == each.x for other in arm.attachments) == 1:
-        pieces = [segment_at(chain, side) for side in sides]
-        beyond, within = (
-            _of_link(*_densities(piece, shapes.omega, *state))["length"]
-            for piece, state in zip(pieces[::-1], (outer, inner), strict=True)
-        )
-        yield "x", (within - beyond) * float(share)
-    translation = per_motion * outer[0] ** 2
-    rotation = per_rotation * outer[1] ** 2
-    energies = {  # kinetic ones negative
-        "mass": -translation,
-        "inertia": -rotation,
-        "stiffness": translation / square,
-        "rotational_stiffness": rotation / square,
-    }
-    yield from ((name, value * energy) for name, energy in energies.items() if (value := getattr(each, name)))
+    is_pinned = not isinstance(k.tip_mass, Fraction)
+    tip = fields[int(is_pinned), 0, -2]
+    if (unit * tip).real < 0:
+        unit = -unit
+    return np.asarray(unit * values[:-1], dtype=complex)

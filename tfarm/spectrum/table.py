@@ -8,12 +8,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import (
-    THEORIES,
-    Arm,
-    Theory,
-    must_be_arm,
-)
+from tfarm.arm import THEORIES, Arm, Theory, must_be_arm
 from tfarm.arm.checks import on_the_arm, whole
 from tfarm.arrays import Real, Whole
 from tfarm.digits import DOUBLE_DIGITS, general, singly
@@ -32,7 +27,8 @@ from tfarm.records import frozen
 from tfarm.schema import Column, Table, Tabled
 from tfarm.spectrum.frequencies import ARMS_KEPT, count_below, natural_frequencies, refine
 from tfarm.spectrum.proofs import Certificate, certify
-from tfarm.spectrum.shapes import Shapes, sensitivities
+from tfarm.spectrum.sensitivities import sensitivities
+from tfarm.spectrum.shapes import Shapes
 
 
 @frozen
@@ -95,8 +91,9 @@ class Modes(Tabled):
 
         digits = max(digits, 12)
         flexible = [refine(self._k, omega, digits) for omega in self.flexible.tolist()]
-        for text in flexible if self.theory == "timoshenko" and self.arm.is_uniform else ():
-            if not roots_near(self.arm, text, digits - 1):
+        is_of_appendix = self.theory == "timoshenko" and self.arm.is_uniform
+        for text in flexible:
+            if is_of_appendix and not roots_near(self.arm, text, digits - 1):
                 raise ConvergenceError(f"Delta(s) of the appendix has no root at {text}i rad/s", text, digits)
         return ["0.0"] * self._rigid + flexible
 
@@ -120,7 +117,7 @@ class Modes(Tabled):
             must_be_of_appendix(self.arm, self.theory)
             starts = self.flexible.tolist()
             flexible = [float(natural_frequency(self.arm, omega, APPENDIX_DIGITS)) for omega in starts]
-        return np.r_[[0.0] * self._rigid, flexible]
+        return self._with_rigid(flexible)
 
     def by_methods(self) -> ByMethod:
         """Return the frequencies [rad/s] by every method that has them, with their differences.
@@ -162,8 +159,10 @@ class Modes(Tabled):
     @cached_property
     def hub_participation(self) -> Real:
         """b = psi(0) [rad/sqrt(kg m^2)] of each mode; b^2 is the residue of hub angle/torque in s^2.  0 if locked."""
-        rigid = 1.0 / math.sqrt(self.arm.total_inertia) if self._rigid else 0.0
-        return np.r_[[rigid] * self._rigid, self._shapes.theta() * self._unit]
+        found = self._with_rigid(self._shapes.theta() * self._unit)
+        if self._rigid:
+            found[0] = 1.0 / math.sqrt(self.arm.total_inertia)
+        return found
 
     @cached_property
     def modal_moment(self) -> Real:
@@ -171,12 +170,12 @@ class Modes(Tabled):
 
         For a hub lighter than the link it is computed so, as the field at the root cancels: 0 for a free pin.
         """
-        link = self.arm.link
-        inertia = self.arm.hub_side_inertia
-        if self.arm.reads_hub_moment and not self.arm.is_locked and inertia < link.rhoA * link.length**3 / 3:
-            return (
-                self.arm.hub.stiffness - inertia * self.natural_frequency**2
-            ) * self.hub_participation + 0.0
+        arm = self.arm
+        inertia = arm.hub_side_inertia
+        is_light = inertia < arm.link.rhoA * arm.link.length**3 / 3
+        if is_light and arm.reads_hub_moment and not arm.is_locked:
+            per_angle = arm.hub.stiffness - inertia * self.natural_frequency**2
+            return per_angle * self.hub_participation + 0.0
         return self.moment(0.0)
 
     @cached_property
@@ -200,13 +199,18 @@ class Modes(Tabled):
         has 0.  A rig has entries for its parts and each of its segments.
         """
         found = sensitivities(self.arm, self._shapes)
-        return {name: np.r_[[0.0] * self._rigid, values] for name, values in found.items()}
+        return {name: self._with_rigid(values) for name, values in found.items()}
 
     # ------------------------------------------------------------ inside
 
     @property
     def _rigid(self) -> bool:
+        """Whether the first mode is the rigid body."""
         return bool(self.index.size and self.index[0] == 0)
+
+    def _with_rigid(self, flexible: Real | list[float]) -> Real:
+        """Return values of the flexible modes behind the 0 of a rigid-body mode."""
+        return np.r_[[0.0] * self._rigid, flexible]
 
     @property
     def _unit(self) -> float:
@@ -239,12 +243,14 @@ class Modes(Tabled):
         grid = np.r_[ends, np.linspace(0.0, 1.0, even)[1:-1], 1.0 - ends[::-1]]
         W, Psi, *_ = shapes(grid)
         # a cut-off mode has W = 0 throughout, to rounding
-        W[abs(W) < 1e-13 * abs(np.hstack([W, Psi])).max(axis=1, keepdims=True)] = 0.0
+        size = abs(np.hstack([W, Psi])).max(axis=1, keepdims=True)
+        W[abs(W) < 1e-13 * size] = 0.0
         mode, start = np.nonzero(W[:, :-1] * W[:, 1:] < 0)
         low = grid[start]
         high = grid[start + 1]
         before = low
-        x = low + (high - low) * W[mode, start] / (W[mode, start] - W[mode, start + 1])
+        here = W[mode, start]
+        x = low + (high - low) * here / (here - W[mode, start + 1])
         # from two digits to more than 64 bits
         for _ in range(6):
             if (abs(x - before) <= np.spacing(1.0)).all():
@@ -267,7 +273,8 @@ def modes(
     # of one table
     most_table_modes = 10_000
     must_be_arm(arm)
-    theory = arm.theory if theory is None else theory
+    if theory is None:
+        theory = arm.theory
     k = system_of(arm, theory).undamped
     rigid = arm.has_rigid_mode
     require(
@@ -285,7 +292,7 @@ def modes(
     require(count <= most_table_modes, "count", count, f"at most {most_table_modes} modes")
     flexible = natural_frequencies(k, rigid + 1, rigid + count)
     index = np.arange(1 - rigid, count + 1)
-    return Modes(arm, theory, index, np.concatenate([[0.0] * rigid, flexible]), k)
+    return Modes(arm, theory, index, np.r_[[0.0] * rigid, flexible], k)
 
 
 def compare_theories(table: Modes) -> dict[Theory, Real]:

@@ -31,12 +31,6 @@ from tfarm.tuner import LearningCurves, Tuning, compare_controllers, tried_loops
 from tfarm.tuner.baselines import Outcomes, quantised_chain
 from tfarm.tuner.tuning import tune_by_default, usual_plan
 
-# flexible modes, by default
-STUDIED_MODES = 4
-# m, for that area
-DEPTHS = (0.002, 0.003, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.040, 0.060)
-# kg m^2, about the value assumed for the paper's hub
-INERTIAS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 # relative: a candidate nearer to the arm's own value is that value
 OWN_VALUE = 1e-9
 
@@ -171,7 +165,7 @@ class Assumptions:
 
 
 def assumptions(arm: Arm, count: int) -> Assumptions:
-    """Frequencies over the candidates of section and hub inertia.
+    """Return frequencies over the candidates of section and hub inertia.
 
     Raises ParameterError for a rig: the paper leaves section and hub of one beam open.
     """
@@ -187,11 +181,11 @@ def assumptions(arm: Arm, count: int) -> Assumptions:
 
 
 def has_hub_inertia(arm: Arm) -> bool:
-    """Whether the hub has an inertia that could be another: neither locked (inf) nor a free pin (0)."""
+    """Return whether the hub has an inertia that could be another: neither locked (inf) nor a free pin (0)."""
     return 0.0 < arm.hub.inertia < math.inf
 
 
-def section_study(arm: Arm, count: int = STUDIED_MODES) -> Candidates:
+def section_study(arm: Arm, count: int = 4) -> Candidates:
     """Return the first `count` flexible frequencies over rectangles of the arm's area.
 
     Depths are 2 to 60 mm for the paper's area, scaled with the root of the area to two digits, and that of the
@@ -199,8 +193,10 @@ def section_study(arm: Arm, count: int = STUDIED_MODES) -> Candidates:
     """
     area = arm.link.section.area
     own = math.sqrt(12.0) * arm.link.section.radius_of_gyration
-    # the paper's area [m^2]
-    depths = _with_own([float(f"{each * math.sqrt(area / 6.0e-4):.2g}") for each in DEPTHS], own)
+    # m, for the paper's area
+    of_paper = (0.002, 0.003, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.040, 0.060)
+    scale = math.sqrt(area / 6.0e-4)
+    depths = _with_own([float(f"{each * scale:.2g}") for each in of_paper], own)
     known = {
         "depth": depths,
         "width": [area / depth for depth in depths],
@@ -221,15 +217,17 @@ def section_study(arm: Arm, count: int = STUDIED_MODES) -> Candidates:
     )
 
 
-def hub_study(arm: Arm, count: int = STUDIED_MODES) -> Candidates:
+def hub_study(arm: Arm, count: int = 4) -> Candidates:
     """Return the first `count` flexible frequencies over inertias of a hub that has one.
 
     Inertias are 0.01 to 1 kg m^2, moved by whole decades if the arm's own lies outside, and the arm's own.
     """
     own = arm.hub.inertia
-    decades = min(0, math.floor(math.log10(own / INERTIAS[0]) + OWN_VALUE))
-    decades += max(0, math.ceil(math.log10(own / INERTIAS[-1]) - OWN_VALUE))
-    inertias = _with_own([inertia * 10.0**decades for inertia in INERTIAS], own)
+    # kg m^2, about the value assumed for the paper's hub
+    usual = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+    decades = min(0, math.floor(math.log10(own / usual[0]) + OWN_VALUE))
+    decades += max(0, math.ceil(math.log10(own / usual[-1]) - OWN_VALUE))
+    inertias = _with_own([inertia * 10.0**decades for inertia in usual], own)
     rows = _candidates(arm, count, "hub.inertia", inertias.index(own), {"hub_inertia": inertias})
     pinned, locked = (
         modes(arm.having(hub_inertia=limit), count).natural_frequency[-count:] for limit in (0.0, math.inf)
@@ -273,7 +271,7 @@ def _candidates(
 
 
 def _with_own(candidates: Sequence[float], own: float) -> list[float]:
-    """The candidates and the arm's own value, ascending; one that equals it, but for rounding, is replaced."""
+    """Return the candidates and the arm's own value, ascending; one that equals it, but for rounding, is replaced."""
     return sorted([*(value for value in candidates if abs(value / own - 1) >= OWN_VALUE), own])
 
 
@@ -354,8 +352,8 @@ def tuner_numbers(arm: Arm, chain: Chain) -> TunerNumbers:
     return TunerNumbers(
         arm=arm,
         tuning=tuning,
-        slews=_simulated(tuning, trial.loop.chain),
-        coarse=_simulated(tuning, listed[late].case.chain),
+        slews=_simulate_both(tuning, trial.loop.chain),
+        coarse=_simulate_both(tuning, listed[late].case.chain),
         curves=learning_curves(arm, plan, own, curve_seeds(plan.trials * trial.n)),
         rows=tuple(rows),
     )
@@ -366,7 +364,7 @@ def curve_seeds(samples: int) -> int:
     return min(20, max(1, CURVE_SAMPLES // samples))
 
 
-def _simulated(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
+def _simulate_both(tuning: Tuning, chain: Chain) -> dict[str, Simulation]:
     without, tuned = traces.resolve_simulations(
         tuning.trial.simulator(chain=chain),
         tuning.trial.arm,

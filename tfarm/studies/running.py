@@ -18,7 +18,7 @@ from functools import cached_property, partial
 from itertools import islice, takewhile
 from logging import getLogger
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,26 +40,30 @@ Row = dict[str, Any]
 ChunkTask = tuple[int, Callable[[], Chunk]]
 # yields each task with its table as it comes
 Engine = Callable[[Iterator[ChunkTask]], Iterator[tuple[int, Chunk]]]
+
+
+class Resources(NamedTuple):
+    """Engine of a run and its number of workers, the time [s] after which no part is begun, and its progress."""
+
+    engine: Engine
+    workers: int
+    deadline: float
+    progress: Progress
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the deadline has passed."""
+        return time.monotonic() >= self.deadline
+
+
 # keys of errors
 OUT = "--out"
-SCHEDULER = "--scheduler"
 # column of the number of the row, from 0
 ROW = "row"
-FILE = "study.json"
 PARQUET = ".parquet"
 STUDY_FILE = "study.toml"
-# rows whose cost is measured, and whose arms are built, before the first run
-PILOT = 3
+# rows whose arms are built before the first run
 CHECKED = 1000
-# of a chunk
-LEAST_SECONDS = 5.0
-MOST_SECONDS = 30.0
-# where that leaves them within these
-CHUNKS_A_WORKER = 10
-# arms whose frequencies are found together; the exact numbers of twice as many are kept
-BATCH = 32
-# seconds for a scheduler to answer, and for its first worker
-PATIENCE = 20
 
 
 @frozen
@@ -100,15 +104,19 @@ def chunk(plan: StudyPlan, first: int, last: int, listed: Real | None = None) ->
 def table_of(plan: StudyPlan, first: int, rows: Real) -> Chunk:
     """Return the table of rows of values (rows, keys), numbered from `first`."""
     table: Chunk = {name: [] for name in plan.columns}
-    for start in range(0, len(rows), BATCH):
-        batch = rows[start : start + BATCH].tolist()
+    # arms whose frequencies are found together; the exact numbers of twice as many are kept
+    together = 32
+    for start in range(0, len(rows), together):
+        batch = rows[start : start + together].tolist()
         subjects = [_attempt(plan.subjects.at, row) for row in batch]
         _attempt(prepare, [each for each in subjects if isinstance(each, Subject)], plan.names)
-        for number, (row, subject) in enumerate(zip(batch, subjects, strict=True), start=first + start):
+        for number, (row, own) in enumerate(zip(batch, subjects, strict=True), start=first + start):
             found: dict[str, Any] = {ROW: number, **dict(zip(plan.space.keys, row, strict=True))}
-            own = _attempt(values_of, subject, plan.sources) if isinstance(subject, Subject) else subject
+            if isinstance(own, Subject):
+                own = _attempt(values_of, own, plan.sources)
             found |= {FAILED: own} if isinstance(own, str) else own
-            found[FAILED] = found[FAILED] and one_line(found[FAILED], 200)
+            reason = found[FAILED]
+            found[FAILED] = reason and one_line(reason, 200)
             for name, column in table.items():
                 column.append(found.get(name))
     return table
@@ -133,10 +141,10 @@ def _attempt(function: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def seconds_an_arm(plan: StudyPlan, rows: Real) -> float:
-    """Return the mean time of the first rows of values (rows, keys) [s]."""
+    """Return the mean time of the last three of some rows of values (rows, keys) [s]."""
     # which compiles
     table_of(plan, 0, rows[:1])
-    pilot = rows[-PILOT:]
+    pilot = rows[-3:]
     began = time.perf_counter()
     table_of(plan, 0, pilot)
     return (time.perf_counter() - began) / len(pilot)
@@ -145,7 +153,8 @@ def seconds_an_arm(plan: StudyPlan, rows: Real) -> float:
 def rows_a_chunk(cost: float, count: int, workers: int) -> int:
     """Return the rows of a chunk of 5 to 30 s for arms of that cost [s], so that all workers end together."""
     whole = cost * count / workers
-    seconds = min(max(whole / CHUNKS_A_WORKER, LEAST_SECONDS), MOST_SECONDS)
+    # ten chunks a worker, where they last that long
+    seconds = min(max(whole / 10, 5.0), 30.0)
     return min(math.ceil(count / (workers * max(1, round(whole / seconds)))), 50_000)
 
 
@@ -181,13 +190,13 @@ class StudyFolder:
     @property
     def is_complete(self) -> bool:
         """Whether every part is written."""
-        return len(self.written()) == self.count
+        return len(self.part_numbers()) == self.count
 
     def path(self, number: int) -> Path:
         """Return the file of a part."""
         return self.folder / f"{self.prefix}{self.digest[:8]}-{number:06}{self.suffix}"
 
-    def written(self) -> list[int]:
+    def part_numbers(self) -> list[int]:
         """Return the numbers of the parts that are there.  Raises ParameterError for a part of another study."""
         names = {each.name for each in self.folder.glob(f"{self.prefix}*")}
         found = [number for number in range(self.count) if self.path(number).name in names]
@@ -205,11 +214,12 @@ class StudyFolder:
         if self.suffix == PARQUET:
             module = parquet("out", "Parquet")
             arrow = importlib.import_module("pyarrow")
+            texts = self.plan.texts
+            columns = {}
+            for name, of in table.items():
+                columns[name] = arrow.array(of, arrow.string() if name in texts else arrow.float64())
             binary = io.BytesIO()
-            kinds = {name: arrow.string() if name in self.plan.texts else arrow.float64() for name in table}
-            module.write_table(
-                arrow.table({name: arrow.array(of, kinds[name]) for name, of in table.items()}), binary
-            )
+            module.write_table(arrow.table(columns), binary)
             content = binary.getvalue()
         else:
             stream = io.StringIO()
@@ -221,10 +231,14 @@ class StudyFolder:
 
     def column(self, *names: str) -> dict[str, Any]:
         """Return columns of all written rows in order: arrays of numbers, NaN where there is none, and of texts."""
-        tables = [self._read(self.path(number), names) for number in self.written()]
-        return {name: np.concatenate([np.empty(0), *(table[name] for table in tables)]) for name in names}
+        tables = [self._read_part(self.path(number), names) for number in self.part_numbers()]
+        found = {}
+        for name in names:
+            columns = [table[name] for table in tables]
+            found[name] = np.concatenate([np.empty(0), *columns])
+        return found
 
-    def _read(self, path: Path, names: Sequence[str]) -> dict[str, Any]:
+    def _read_part(self, path: Path, names: Sequence[str]) -> dict[str, Any]:
         if self.suffix == PARQUET:
             table = parquet("out", str(path)).read_table(path, columns=list(names)).to_pydict()
         else:
@@ -255,10 +269,11 @@ def open_study(
     `rows` are the values of the first rows.  Raises ParameterError for a folder that has another study.
     """
     space = plan.space
-    file = folder / FILE
+    name = "study.json"
+    file = folder / name
     suffix = PARQUET if importlib.util.find_spec("pyarrow") else ".csv"
     hashes = {
-        name: hashlib.sha256(content).hexdigest() for name, content in files.items() if name != STUDY_FILE
+        each: hashlib.sha256(content).hexdigest() for each, content in files.items() if each != STUDY_FILE
     }
     inputs = json.loads(
         json.dumps(
@@ -277,7 +292,7 @@ def open_study(
     )
     if file.exists():
         known = validated_file(
-            StudyRecord, file, 1 << 20, key=OUT, what=f"a {FILE} of tfarm study; choose another folder"
+            StudyRecord, file, 1 << 20, key=OUT, what=f"a {name} of tfarm study; choose another folder"
         )
         other = sorted(key for key in {*inputs, *known.inputs} if known.inputs.get(key) != inputs.get(key))
         require(
@@ -288,14 +303,15 @@ def open_study(
         )
         count = known.rows_a_part
     else:
-        count = size or rows_a_chunk(seconds_an_arm(plan, rows[:PILOT]), space.count, workers)
+        count = size or rows_a_chunk(seconds_an_arm(plan, rows[:3]), space.count, workers)
     digest = hashlib.sha256(json.dumps([inputs, count]).encode()).hexdigest()
     parts = StudyFolder(folder, plan, digest, count, suffix, space.count)
     # is refused before a file is written
-    parts.written()
-    text = StudyRecord(inputs=inputs, rows_a_part=count).model_dump_json(indent=1)
-    for name, content in {**files, FILE: f"{text}\n".encode()}.items() if not file.exists() else ():
-        write_file(folder / name, content, key=OUT)
+    parts.part_numbers()
+    if not file.exists():
+        text = StudyRecord(inputs=inputs, rows_a_part=count).model_dump_json(indent=1)
+        for each, content in {**files, name: f"{text}\n".encode()}.items():
+            write_file(folder / each, content, key=OUT)
     return parts
 
 
@@ -318,56 +334,52 @@ def run_parts(
     folder: Path,
     plan: StudyPlan,
     files: Mapping[str, bytes],
-    engine: Engine,
-    workers: int,
-    deadline: float,
+    resources: Resources,
     size: int | None,
-    progress: Progress,
 ) -> StudyFolder:
     """Write the missing parts of a study to its folder."""
     count = min(CHECKED, plan.space.count)
     listing = plan.space.listing
     rows = plan.space.rows(0, count, None if listing is None else next(listing.blocks([(0, count)])))
     check_rows(plan, rows)
-    parts = open_study(folder, plan, files, workers, size, rows)
+    parts = open_study(folder, plan, files, resources.workers, size, rows)
 
     def calls(ends: Sequence[tuple[int, int]]) -> Iterator[Callable[[], Chunk]]:
         blocks = [None] * len(ends) if listing is None else listing.blocks(ends)
         for (first, last), listed in zip(ends, blocks, strict=True):
             yield partial(chunk, plan, first, last, listed)
 
-    write_missing_parts(parts, calls, engine, deadline, progress, "parts of the study")
+    write_missing_parts(parts, calls, resources, "parts of the study")
     return parts
 
 
 def write_missing_parts(
     parts: StudyFolder,
     calls: Callable[[Sequence[tuple[int, int]]], Iterable[Callable[[], Chunk]]],
-    engine: Engine,
-    deadline: float,
-    progress: Progress,
+    resources: Resources,
     text: str,
 ) -> None:
-    """Write the missing parts by the calls for their ranges of rows; after the deadline [s] none is begun any more."""
-    done = set(parts.written())
+    """Write the missing parts by the calls for their ranges of rows; after the deadline none is begun any more."""
+    done = parts.part_numbers()
+    count = parts.count
     began = time.monotonic()
-    missing = [number for number in range(parts.count) if number not in done]
-    progress(len(done), parts.count, text)
+    missing = sorted({*range(count)} - {*done})
+    resources.progress(len(done), count, text)
     ends = [(number * parts.rows, min((number + 1) * parts.rows, parts.size)) for number in missing]
-    tasks = takewhile(lambda _: time.monotonic() < deadline, zip(missing, calls(ends), strict=True))
-    for ready, (number, table) in enumerate(engine(tasks), start=1):
+    tasks = takewhile(lambda _: not resources.is_over, zip(missing, calls(ends), strict=True))
+    for ready, (number, table) in enumerate(resources.engine(tasks), start=1):
         parts.write(number, table)
         left = (time.monotonic() - began) / ready * (len(missing) - ready)
-        progress(len(done) + ready, parts.count, f"{text}, {left:.0f} s left")
+        resources.progress(len(done) + ready, count, f"{text}, {left:.0f} s left")
 
 
 def search_rows(
-    parts: StudyFolder, search: Callable[[Callable[[Real], Row]], object], deadline: float
+    parts: StudyFolder, search: Callable[[Callable[[Real], Row]], object], resources: Resources
 ) -> list[Row] | None:
     """Return the rows of a search, which asks for the results of one row of values (1, keys) after another.
 
     Each is written as a part and computed once: an interrupted search goes on where it was.  None where it has no end
-    before the deadline [s].
+    before the deadline.
     """
     known = rows_of(parts.column(*parts.plan.columns))
     seen = list[Row]()
@@ -375,7 +387,7 @@ def search_rows(
     def result(values: Real) -> Row:
         n = len(seen)
         if n == len(known):
-            if time.monotonic() >= deadline:
+            if resources.is_over:
                 raise TimeoutError
             table = table_of(parts.plan, n, values)
             parts.write(n, table)
@@ -401,33 +413,32 @@ def check_rows(plan: StudyPlan, rows: Real) -> None:
         except ParameterError as error:
             errors[number] = error
     for number, first in errors.items():
-        raise ParameterError(
-            key=first.key,
-            value=first.value,
-            remedy=f"{len(errors)} of {len(rows)} arms are illegal, the first in row {number}: {first.remedy}",
-        )
+        remedy = f"{len(errors)} of {len(rows)} arms are illegal, the first in row {number}: {first.remedy}"
+        raise ParameterError(key=first.key, value=first.value, remedy=remedy)
 
 
 # ------------------------------------------------------------------------------------------------------------ cluster
 
 
-def cluster(scheduler: str) -> Any:
+def cluster(scheduler: str, patience: float = 20) -> Any:
     """Return a client of a Dask scheduler, such as tcp://host:8786.  Raises ParameterError where none answers.
 
-    Certificates of a tls:// address are those of Dask's own configuration (distributed.comm.tls).
+    It has `patience` [s] to answer, and as long for its first worker.  Certificates of a tls:// address are those of
+    Dask's own configuration (distributed.comm.tls).
     """
-    distributed = extra("distributed", "cluster", SCHEDULER, scheduler)
+    key = "--scheduler"
+    distributed = extra("distributed", "cluster", key, scheduler)
     # whose errors come as one line of ours
     for name in ("distributed", "distributed.client"):
         getLogger(name).setLevel("CRITICAL")
     try:
-        client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
-        client.wait_for_workers(1, timeout=PATIENCE)
+        client = distributed.Client(scheduler, timeout=patience, set_as_default=False)
+        client.wait_for_workers(1, timeout=patience)
     except (OSError, ValueError, TypeError) as error:
         raise ParameterError(
-            key=SCHEDULER,
+            key=key,
             value=scheduler,
-            remedy=f"no scheduler with a worker answers within {PATIENCE} s ({str(error)[:120]}); give tcp://HOST:PORT",
+            remedy=f"no scheduler with a worker answers within {patience:g} s ({str(error)[:120]}); give tcp://HOST:PORT",
         ) from None
     return client
 

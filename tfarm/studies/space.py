@@ -36,13 +36,8 @@ from tfarm.foreign import read_by_child
 from tfarm.records import frozen
 from tfarm.tuner import tuning
 
-# prefixes of the numbers of the controller and of the tuner
-LAW = "law."
-TUNER = "tuner."
 # of one study
 MOST_ROWS = 10_000_000
-LIST = "a CSV or Parquet file with a column a key"
-MOST_SEED = 2**63
 # of uniform numbers: at 0 and 1 the inverse of a normal distribution is infinite
 ENDS = 2.0**-54, 1 - 2.0**-53
 # kind of a distribution: its numbers in words, and SciPy's, whose quantiles are NaN for others
@@ -52,13 +47,16 @@ FORMS: dict[str, tuple[str, Callable[..., Any]]] = {
     "normal": ("MEAN, DEVIATION", lambda mean, deviation: scipy.stats.norm(mean, deviation)),
     "lognormal": ("MEDIAN, DEVIATION of ln", lambda median, s: scipy.stats.lognorm(s, scale=median)),
 }
+
+
+def grid_points(low: float, high: float, count: float) -> list[float]:
+    """Return the points of a grid; none where its ends or their number are none of one."""
+    is_grid = low < high and count % 1 == 0 < count <= MOST_ROWS
+    return np.linspace(low, high, int(count)).tolist() if is_grid else []
+
+
 GRIDS: dict[str, tuple[str, Callable[..., Any]]] = {
-    "grid": (
-        "LOW, HIGH, COUNT",
-        lambda low, high, count: (
-            low < high and count % 1 == 0 < count <= MOST_ROWS and np.linspace(low, high, int(count)).tolist()
-        ),
-    ),
+    "grid": ("LOW, HIGH, COUNT", grid_points),
     "values": ("at least one number", lambda *values: values),
 }
 KINDS = {**FORMS, **GRIDS}
@@ -118,15 +116,16 @@ class Space:
         return {key: each.frozen for key, each in self.over.items() if each.kind in GRIDS}
 
     @property
-    def drawn(self) -> tuple[str, ...]:
+    def drawn_keys(self) -> tuple[str, ...]:
         """Keys of distributions, then those of the posterior."""
-        own = tuple(key for key, each in self.over.items() if each.kind in FORMS)
-        return (*own, *(key for key in (self.posterior.keys if self.posterior else ()) if key not in own))
+        own = [key for key, each in self.over.items() if each.kind in FORMS]
+        fitted = self.posterior.keys if self.posterior else ()
+        return tuple(dict.fromkeys([*own, *fitted]))
 
     @property
     def keys(self) -> tuple[str, ...]:
         """Keys of the varied numbers, in the order of the columns."""
-        return (*(self.listing.columns if self.listing else ()), *self.drawn, *self.grids)
+        return (*(self.listing.columns if self.listing else ()), *self.drawn_keys, *self.grids)
 
     @cached_property
     def points(self) -> int:
@@ -136,12 +135,17 @@ class Space:
     @cached_property
     def count(self) -> int:
         """Number of rows."""
-        return (self.listing.size if self.listing else self.draws if self.drawn else 1) * self.points
+        rows = 1
+        if self.listing:
+            rows = self.listing.size
+        elif self.drawn_keys:
+            rows = self.draws
+        return rows * self.points
 
     @property
     def is_independent(self) -> bool:
         """Whether the rows are independent draws: confidence needs that."""
-        return bool(self.drawn) and not (self.grids or self.listing)
+        return bool(self.drawn_keys) and not (self.grids or self.listing)
 
     def rows(self, first: int, last: int, listed: Real | None) -> Real:
         """Return rows first to last - 1 (rows, keys); `listed` are those of the list behind them."""
@@ -157,7 +161,7 @@ class Space:
         """Return the drawn values (rows, drawn) of uniform numbers (rows, drawn)."""
         fixed = {
             key: self.over[key].frozen.ppf(uniform[:, n])
-            for n, key in enumerate(self.drawn)
+            for n, key in enumerate(self.drawn_keys)
             if key in self.over
         }
         found = np.array([*fixed.values()]).reshape(len(fixed), len(uniform)).T
@@ -168,7 +172,7 @@ class Space:
     def uniform(self, n: int) -> Real:
         """Return the uniform numbers (drawn,) of draw n, in (0, 1)."""
         generator = np.random.Generator(np.random.Philox(key=self.seed, counter=n << 64))
-        return np.maximum(generator.random(len(self.drawn)), ENDS[0])
+        return np.maximum(generator.random(len(self.drawn_keys)), ENDS[0])
 
 
 def space_of(
@@ -219,9 +223,14 @@ def _distribution(place: str, entry: Any) -> Distribution:
     with suppress(TypeError), np.errstate(all="ignore"):
         found = Distribution(kind, tuple(number(place, each, remedy) for each in numbers))
         points = found.frozen.ppf(ENDS) if kind in FORMS else found.frozen
-        is_finite = points is not False and len(points) > 0 and bool(np.isfinite(points).all())
+        is_finite = len(points) > 0 and bool(np.isfinite(points).all())
     require(is_finite, place, numbers, remedy)
     return found
+
+
+def _names_after(prefix: str, keys: Sequence[str]) -> dict[str, str]:
+    """Return the keys with a prefix, and their names without it."""
+    return {key: key.removeprefix(prefix) for key in keys if key.startswith(prefix)}
 
 
 class Subjects:
@@ -235,57 +244,53 @@ class Subjects:
     def __init__(self, case: Case, keys: Sequence[str], fitted: Collection[str] = ()) -> None:
         self.case = case
         self.keys = keys
-        numbers = {
-            f"{table}.{each.name}": (table, each.name)
-            for table in CHAIN_TABLES
-            for each in fields(getattr(case.chain, table))
-            if float in (each.type, *get_args(each.type))
-        }
+        numbers: dict[str, tuple[str, str]] = {}
+        for table in CHAIN_TABLES:
+            for each in fields(getattr(case.chain, table)):
+                if float in (each.type, *get_args(each.type)):
+                    numbers[f"{table}.{each.name}"] = (table, each.name)
         self._of_chain = {key: numbers[key] for key in keys if key in numbers}
-        self._of_law = [key for key in keys if key.startswith(LAW)]
+        self._of_law = _names_after("law.", keys)
         signals = []
-        for name in (key.removeprefix(LAW) for key in self._of_law):
+        for name in self._of_law.values():
             case.feedback.having(name, 1.0)
             signals.append(OUTPUT_OF.get(name, name).removesuffix(".gain"))
-        require(
-            len(set(signals)) == len(signals),
-            "over",
-            self._of_law,
-            "two keys are one number of the controller",
-        )
-        self._of_tuner = [key for key in keys if key.startswith(TUNER)]
-        for key in self._of_tuner:
-            must_be_known("tuner", key.removeprefix(TUNER), (*tuning.NUMBERS, *tuning.NUMBERS_OF_LEARNING))
-        own = [key for key in keys if not key.startswith((LAW, TUNER)) and key not in numbers]
+        remedy = "two keys are one number of the controller"
+        require(len(set(signals)) == len(signals), "over", [*self._of_law], remedy)
+        self._of_tuner = _names_after("tuner.", keys)
+        for name in self._of_tuner.values():
+            must_be_known("tuner", name, (*tuning.NUMBERS, *tuning.NUMBERS_OF_LEARNING))
+        elsewhere = {*self._of_chain, *self._of_law, *self._of_tuner}
+        own = [key for key in keys if key not in elsewhere]
         for key in own:
-            must_be_known("over", key, [*numbers_of(case.arm), *numbers, f"{LAW}NUMBER", f"{TUNER}NUMBER"])
+            must_be_known("over", key, [*numbers_of(case.arm), *numbers, "law.NUMBER", "tuner.NUMBER"])
         self._arms = KeyedArms(case.arm, own, "over", alone={*own} - {*fitted})
 
     @property
     def notes(self) -> list[str]:
         """The shear moduli of links whose Young's modulus is varied."""
-        words = {
-            True: "G changes with it, at a constant Poisson's ratio",
-            False: "G as it is stated or varied itself",
-        }
-        return [
-            f"{key}: {words[self._arms.is_shear_scaled(key)]}" for key in self._arms.keys if "youngs" in key
-        ]
+        found = []
+        for key in self._arms.keys:
+            if "youngs" in key:
+                word = "G as it is stated or varied itself"
+                if self._arms.is_shear_scaled(key):
+                    word = "G changes with it, at a constant Poisson's ratio"
+                found.append(f"{key}: {word}")
+        return found
 
     def at(self, row: Sequence[float]) -> Subject:
         """Return the case of a row.  Raises ParameterError for an illegal value."""
         values = dict(zip(self.keys, row, strict=True))
+        arm = self._arms.arm
         if self._arms.keys:
             arm = self._arms.at({key: values[key] for key in self._arms.keys})
-        else:
-            arm = self._arms.arm
         law = self.case.feedback
-        for key in self._of_law:
-            law = law.having(key.removeprefix(LAW), values[key])
+        for key, name in self._of_law.items():
+            law = law.having(name, values[key])
         chain = self.case.chain
         for key, (table, name) in self._of_chain.items():
             chain = replace(chain, **{table: replace(getattr(chain, table), **{name: values[key]})})
-        tuner = {key.removeprefix(TUNER): values[key] for key in self._of_tuner}
+        tuner = {name: values[key] for key, name in self._of_tuner.items()}
         return Subject(Case(arm, law, chain), tuner)
 
 
@@ -320,29 +325,30 @@ def lines_of(path: Path) -> Iterator[Any]:
         for n, row in enumerate(lines):
             require(len(row) == len(names), f"row {n}", len(row), f"{len(names)} values, one a column")
             for name, cell in zip(names, row, strict=True):
-                is_finite = re.compile(r" *[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)? *", re.ASCII).fullmatch(
-                    cell
-                ) and math.isfinite(float(cell))
+                is_number = re.fullmatch(r" *[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)? *", cell, re.ASCII)
+                is_finite = is_number and math.isfinite(float(cell))
                 require(is_finite, f"row {n}, column {name}", cell, "every cell is a finite number")
             yield list(map(float, row))
 
 
 def _cells(path: Path) -> Iterator[Sequence[str]]:
     """Yield names and rows of a CSV file, or of a Parquet one by another process, a few in memory at a time."""
+    form = "a CSV or Parquet file with a column a key"
     # characters, of some ten thousand numbers
     longest_line = 1 << 20
-    # of these rows, of twenty numbers
-    with open_file(path, (4 << 30), key="list", what=LIST) as file:
+    # a list of the most rows, of twenty numbers
+    most_bytes = 4 << 30
+    with open_file(path, most_bytes, key="list", what=form) as file:
         is_parquet = path.suffix == ".parquet" and parquet("list", str(path))
         try:
-            child = partial(read_by_child, "parquet", path, key="list", remedy=f"cannot be read; give {LIST}")
+            child = partial(read_by_child, "parquet", path, key="list", remedy=f"cannot be read; give {form}")
             with child() if is_parquet else nullcontext(file) as rows:
                 text = io.TextIOWrapper(rows, encoding="utf-8-sig", newline="")
                 # a file without an end of a line is no reason to have it in memory
                 yield from csv.reader(iter(partial(text.readline, longest_line), ""), strict=True)
         except (OSError, UnicodeDecodeError, csv.Error) as error:
             raise ParameterError(
-                key="list", value=str(path), remedy=f"cannot be read ({error}); give {LIST}"
+                key="list", value=str(path), remedy=f"cannot be read ({error}); give {form}"
             ) from None
 
 

@@ -24,8 +24,9 @@ from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, Scenario, scenario
-from tfarm.dsp.plant import PulseTransfer, sensed_plant
+from tfarm.dsp.pulse import PulseTransfer
 from tfarm.dsp.scenarios import TRIAL_SLEWS, trial_weights
+from tfarm.dsp.sensed import sensed_plant
 from tfarm.loop.continuous import frequency_above_mode, grid
 from tfarm.records import frozen
 from tfarm.reduced.modal import ALGEBRAIC, sensed_model
@@ -203,7 +204,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
     if by_difference and "hub_angle" not in signals:
         read = (*signals, "hub_angle")
     sensed = sensed_plant(arm, chain, read, count)
-    pulse = PulseTransfer(sensed.together, chain.sampling).folded()
+    pulse = PulseTransfer(sensed.together, chain.sampling).without_fast_poles()
     A, B, C = pulse.matrices()
     own = sensed.own_moment(chain.sampling) if "root_moment" in signals else 0.0 * C[0]
     # of the two states of the rigid body those that the loop does not have; of an arm that turns the angle is the last

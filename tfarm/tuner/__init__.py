@@ -1,4 +1,12 @@
-"""Neural gain tuner: a network sets the moment gain during a slew, within a guard that is certified stable."""
+"""Neural gain tuner: a network sets the moment gain during a slew, within a guard that is certified stable.
+
+kernel     compiled trial forward, and its gradient backward; the network
+guard      sectors of gains that may vary arbitrarily, with their proof
+trial      the slew of an arm under the network, its cost, and the file of a tuner
+training   compiled learning rules, and learning curves
+baselines  best constant gain, input shaping and the linear-quadratic bound
+tuning     guard, training and baselines in one call, and their record
+"""
 
 from tfarm.tuner.baselines import (
     BestConstant,

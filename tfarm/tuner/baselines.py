@@ -82,38 +82,44 @@ def best_constant(trial: Trial) -> BestConstant:
 def lq_bound(trial: Trial) -> Record:
     """Return the optimal trial; its K is zero, as it has no moment feedback, and its u is e."""
     model = trial.model
+    n = trial.n
     m = trial.reference.rigid
-    a = trial.numbers.T * trial.cost.a
-    b = trial.numbers.T * trial.cost.b
+    rest = trial.reference.rest
+    numbers = trial.numbers
+    a = numbers.T * numbers.a
+    b = numbers.T * numbers.b
     # of the states and 1: the last column of A is B r, the last entry of c is -m
     A = np.pad(model.A, (0, 1))
     B = np.r_[model.B, 0.0]
     c = np.r_[model.moment, 0.0]
     A[-1, -1] = 1.0
     P = np.zeros_like(A)
-    gains = np.zeros((trial.n, B.size))
+    gains = np.zeros((n, B.size))
     # e_k = -gains_k s, the last sample first
-    for k in reversed(range(trial.n)):
-        A[:-1, -1] = model.B * trial.reference.rest[k]
+    for k in reversed(range(n)):
+        A[:-1, -1] = model.B * rest[k]
         c[-1] = -m[k]
         PB = P @ B
-        if (weight := b + B @ PB) > 0:
-            gains[k] = A.T @ PB / weight
-        closed = A - np.outer(B, gains[k])
-        P = closed.T @ P @ closed + b * np.outer(gains[k], gains[k]) + a * np.outer(c, c)
+        gain = gains[k]
+        weight = b + B @ PB
+        if weight > 0:
+            gain[:] = A.T @ PB / weight
+        closed = A - np.outer(B, gain)
+        P = closed.T @ P @ closed + b * np.outer(gain, gain) + a * np.outer(c, c)
         P = (P + P.T) / 2
-    states = np.zeros((trial.n + 1, B.size - 1))
-    e = np.zeros(trial.n)
+    states = np.zeros((n + 1, B.size - 1))
+    e = np.zeros(n)
     for k, gain in enumerate(gains):
         e[k] = -gain[:-1] @ states[k] - gain[-1]
-        states[k + 1] = model.A @ states[k] + model.B * (e[k] + trial.reference.rest[k])
-    x = states[:-1] @ model.moment - m
+        states[k + 1] = model.A @ states[k] + model.B * (e[k] + rest[k])
+    at_samples = states[:-1]
+    x = at_samples @ model.moment - m
     cost = float((a * x @ x + b * e @ e) / 2)
-    return Record(trial.task.t, x, e, e, np.zeros(trial.n), states[:-1] @ model.own, cost, None)
+    return Record(trial.task.t, x, e, e, np.zeros(n), at_samples @ model.own, cost, None)
 
 
 def zero_vibration(z: complex) -> Real:
-    """Impulses (n + 2,) of the shaper with zeros at z and its conjugate, 0 < arg z < pi."""
+    """Return the impulses (n + 2,) of the shaper with zeros at z and its conjugate, 0 < arg z < pi."""
     n = max(1, math.floor(math.pi / abs(np.angle(z)) * (1 + TIME_ROUNDING)))
     at = np.array([0, n, n + 1])
     powers = z ** (-at.astype(float))
@@ -124,7 +130,7 @@ def zero_vibration(z: complex) -> Real:
 
 
 def extra_insensitive(z: complex) -> Real:
-    """Impulses of two such shapers in a row, next to the frequency of z."""
+    """Return the impulses of two such shapers in a row, next to the frequency of z."""
     # V, the share of the vibration that is left at the mode itself, is that of its authors
     V = 0.05
     d = math.acos((1 - V) / (1 + V)) / math.pi
@@ -135,15 +141,16 @@ def extra_insensitive(z: complex) -> Real:
 
 
 def shaper(loop: Sampled, kind: Shaper, modes: int = 2) -> Real:
-    """Impulses for the first modes below half the sample rate, at the poles of the loop without moment feedback.
+    """Return the impulses for the first modes below half the sample rate, at poles without moment feedback.
 
     By default for those two that a slew excites most.
     """
     impulses = np.ones(1)
+    plant = loop.plant
     build = zero_vibration if kind == "ZV" else extra_insensitive
     poles: Any = loop.having(MOMENT_GAIN, 0.0).poles
     for mode in range(1, modes + 1):
-        own = loop.plant.poles[(loop.plant.mode == mode) & (loop.plant.poles.imag > 0)]
+        own = plant.poles[(plant.mode == mode) & (plant.poles.imag > 0)]
         upper = poles.z[(poles.mode == mode) & (poles.z.imag > 0)]
         if own.size and upper.size and own[0].imag * loop.chain.sampling.period < math.pi:
             impulses = np.convolve(impulses, build(complex(upper[0])))
@@ -151,7 +158,7 @@ def shaper(loop: Sampled, kind: Shaper, modes: int = 2) -> Real:
 
 
 def shape_scenario(task: Scenario, impulses: Real) -> Scenario:
-    """The scenario with every reference passed through the impulses; its slew ends later by their length."""
+    """Return the scenario with every reference passed through the impulses; its slew ends later by their length."""
     names = ("feedforward", "hub_angle", "hub_rate", "rigid_moment")
     through: dict[str, Any] = {
         name: np.convolve(getattr(task, name), impulses)[: task.t.size] for name in names
@@ -184,7 +191,7 @@ class Outcome(NamedTuple):
     tip_error: Annotated[float | None, Quantity(help="tip error at the end [m]")]
 
     def as_text(self, digits: int) -> str:
-        """The cost."""
+        """Return the cost."""
         return f"{self.cost:.{digits}g}"
 
 
@@ -232,7 +239,7 @@ class NamedLoop(NamedTuple):
 
 
 def quantised_chain(arm: Arm, chain: Chain) -> Chain:
-    """The chain with its own converters; ideal ones are replaced by 12 bits over ranges for the arm's slew.
+    """Return the chain with its own converters; ideal ones are replaced by 12 bits over ranges for the arm's slew.
 
     These are 20 N m of moment and 10 N m of torque on the paper's arm, in the unit of torque of any other.
     """
@@ -261,9 +268,11 @@ def tried_loops(case: Case, quantised: Chain | None = None) -> list[NamedLoop]:
     sampling = replace(case.chain.sampling, delay_samples=delay + 1)
     late = f"one {'more ' * bool(delay)}sample of delay"
     # shares of the payload, or of the arm's mass: 0.1, 0.25 and 0.5 kg on the paper's
-    mass, masses = (
-        (arm.payload_mass, (0.5, 1.5, 2.0)) if arm.payload_mass else (arm.own_mass, (0.06, 0.15, 0.3))
-    )
+    mass = arm.own_mass
+    masses = (0.06, 0.15, 0.3)
+    if arm.payload_mass:
+        mass = arm.payload_mass
+        masses = (0.5, 1.5, 2.0)
     payloads = [float(f"{share * mass:.2g}") for share in masses]
     # by damping ratios of mode 1: 1e-5 and 1e-3 s on the paper's
     dampings = [float(f"{2 * zeta / first_frequency(arm):.1g}") for zeta in (3.575e-4, 3.575e-2)]
@@ -274,13 +283,14 @@ def tried_loops(case: Case, quantised: Chain | None = None) -> list[NamedLoop]:
         **{f"hub {share - 1:+.0%}": arm.having(hub_inertia=share * arm.hub_inertia) for share in (0.8, 1.2)},
         **{f"C = {C:g} s": arm.having(damping=C) for C in dampings},
     }
-    return [
-        NamedLoop("as trained", case),
-        NamedLoop("quantised", coarse),
-        NamedLoop(late, case.through(replace(case.chain, sampling=sampling))),
-        NamedLoop(f"quantised, {late}", coarse.through(replace(coarse.chain, sampling=sampling))),
-        *(NamedLoop(name, case.on(each)) for name, each in others.items()),
-    ]
+    cases = {
+        "as trained": case,
+        "quantised": coarse,
+        late: case.through(replace(case.chain, sampling=sampling)),
+        f"quantised, {late}": coarse.through(replace(coarse.chain, sampling=sampling)),
+        **{name: case.on(each) for name, each in others.items()},
+    }
+    return [NamedLoop(name, each) for name, each in cases.items()]
 
 
 def compare_controllers(
@@ -316,19 +326,19 @@ def compare_controllers(
 
 
 def _proven(here: Trial, guard: Guard) -> bool:
-    """Whether the sector is certified for this loop, with the trial's modes."""
+    """Return whether the sector is certified for this loop, with the trial's modes."""
     with suppress(ConvergenceError):
         return not here.arm.is_undamped and MovingGain(here.loop).proof(guard.lo, guard.hi) is not None
     return False
 
 
 def _constant(trial: Trial, K: float) -> Outcome:
-    """The outcome of a constant gain."""
+    """Return the outcome of a constant gain."""
     return _outcome(trial.simulator().linear(trial.loop.gains.having(MOMENT_GAIN, K)), trial)
 
 
 def _outcome(run: Simulation, trial: Trial) -> Outcome:
-    """The outcome of a simulation, by the cost of a trial."""
+    """Return the outcome of a simulation, by the cost of a trial."""
     return Outcome(
         record_of_simulation(run, trial.cost, trial.signals).cost, run.residual_moment, tip_off(run, trial)
     )

@@ -45,7 +45,8 @@ from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 
 from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN
 from tfarm.arrays import Real
-from tfarm.dsp.plant import first_distinct, held_amplitude
+from tfarm.dsp.plant import first_distinct
+from tfarm.dsp.pulse import held_amplitude
 from tfarm.dsp.stages import not_covered
 from tfarm.errors import CertificationError, ConvergenceError, must_be_known
 from tfarm.exact.rationals import exact_matrix, falls, is_positive_definite
@@ -73,7 +74,7 @@ class CommonLyapunov:
     contraction: float
 
     def is_proven(self) -> bool:
-        """Whether P > 0 and both inequalities hold in exact arithmetic.
+        """Return whether P > 0 and both inequalities hold in exact arithmetic.
 
         In the states 2^k s, k whole and such that P has diagonal entries near 1: P has all its digits in any units, and
         nothing is rounded by the change of units, as powers of two are exact.
@@ -135,7 +136,7 @@ class MovingGain:
         return self.loop.having(MOMENT_GAIN, 0.0).reduced_matrix()
 
     @cached_property
-    def _fed_back(self) -> Real:
+    def _feedback(self) -> Real:
         """drive sense^T: the change of the matrix by a gain of -1."""
         return self.open - self.loop.having(MOMENT_GAIN, 1.0).reduced_matrix()
 
@@ -144,20 +145,20 @@ class MovingGain:
         """(n,): the row of the moment."""
         # of the torque: its drive is 1
         return np.asarray(
-            self._fed_back[self.loop.pulse.integrals_at + 2 - len(self.loop.matrix()) + len(self.open)]
+            self._feedback[self.loop.pulse.integrals_at + 2 - len(self.loop.matrix()) + len(self.open)]
         )
 
     @cached_property
     def drive(self) -> Real:
         """(n,): the column of the torque."""
-        return np.asarray(self._fed_back @ self.sense / (self.sense @ self.sense))
+        return np.asarray(self._feedback @ self.sense / (self.sense @ self.sense))
 
     def at(self, K: float) -> Real:
-        """The closed-loop matrix at a gain."""
-        return self.open - K * self._fed_back
+        """Return the closed-loop matrix at a gain."""
+        return self.open - K * self._feedback
 
     def radius(self, m: float) -> float:
-        """Half the width of the widest sector around m; 0 where m itself is unstable."""
+        """Return half the width of the widest sector around m; 0 where m itself is unstable."""
         w, V = np.linalg.eig(self.at(m))
         if not abs(w).max() < 1.0:
             return 0.0
@@ -165,7 +166,7 @@ class MovingGain:
         return float(1.0 / _peak(r, w))
 
     def proof(self, lo: float, hi: float) -> CommonLyapunov | None:
-        """The Lyapunov function of [lo, hi], proven in exact arithmetic; None where there is none."""
+        """Return the Lyapunov function of [lo, hi], proven in exact arithmetic; None where there is none."""
         half = (hi - lo) / 2
         found = common_lyapunov(
             self.at((lo + hi) / 2),
@@ -178,7 +179,7 @@ class MovingGain:
 
 
 def _peak(residues: NDArray[np.complexfloating], poles: NDArray[np.complexfloating]) -> float:
-    """max over the unit circle of |sum of residues/(z - poles)|."""
+    """Return max over the unit circle of |sum of residues/(z - poles)|."""
     # points around the angle of each pole, whose distance from the circle is known to 1e-12
     away = np.geomspace(0.01, 100.0, 30)
     width = np.maximum(1 - abs(poles), 1e-12)[:, None] * np.r_[-away, 0.0, away]
@@ -263,16 +264,16 @@ def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
     must_be_known("guard", kind, get_args(GuardKind))
     if kind == "none":
         return Guard("none", 0.0, math.inf, loop.plant.count, False)
-    find, sector = (
-        (_frozen, "constant gain") if kind == "frozen" else (_moving, "sector of time-varying gains")
-    )
-    if guard := find(_larger(loop), best_constant):
+    find = _find_interval if kind == "frozen" else _find_sector
+    sector = "constant gain" if kind == "frozen" else "sector of time-varying gains"
+    guard = find(_larger(loop), best_constant)
+    if guard:
         return guard
     arm = loop.plant.arm
     gains = loop.gains
-    at = ", ".join(
-        f"{name} = {gains[name]:g}" for name in (RATE_GAIN, ANGLE_GAIN) if name == RATE_GAIN or gains[name]
-    )
+    at = f"{RATE_GAIN} = {gains[RATE_GAIN]:g}"
+    if gains[ANGLE_GAIN]:
+        at += f", {ANGLE_GAIN} = {gains[ANGLE_GAIN]:g}"
     start = f"{arm.name}: no {sector} is certified stable at {at}, C = {arm.damping:g} s"
     # the least damping with a guard, of a few [s]
     for C in filter(arm.damping.__lt__, np.geomspace(1e-12, 1e-2, 11).tolist()):
@@ -285,12 +286,12 @@ def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
 
 
 def constant_windows(loop: Sampled) -> list[tuple[float, float]]:
-    """The stability intervals of constant gains K >= 0, up to 10."""
+    """Return the stability intervals of constant gains K >= 0, up to 10."""
     return [(max(low, 0.0), min(high, 10.0)) for low, high in stable_windows(loop, MOMENT_GAIN) if high > 0]
 
 
-def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
-    """The stability interval common to all models, without its outermost hundredth."""
+def _find_interval(loops: list[Sampled], best_constant: float) -> Guard | None:
+    """Return the stability interval common to all models, without its outermost hundredth."""
     found = []
     for windows in map(constant_windows, loops):
         if not windows:
@@ -301,22 +302,22 @@ def _frozen(loops: list[Sampled], best_constant: float) -> Guard | None:
         )
     low = max(low for low, _ in found)
     high = min(high for _, high in found)
-    edge = (1 - RADIUS_SHARE) * (high - low)
-    is_wide = high - low >= NARROWEST_SECTOR
-    if is_wide:
+    width = high - low
+    edge = (1 - RADIUS_SHARE) * width
+    if width >= NARROWEST_SECTOR:
         return _guard("frozen", loops, found, low + edge * (low > 0), high - edge)
     return None
 
 
-def _moving(loops: list[Sampled], best_constant: float) -> Guard | None:
-    """The sector of the default rule, certified in every model."""
+def _find_sector(loops: list[Sampled], best_constant: float) -> Guard | None:
+    """Return the sector of the default rule, certified in every model."""
     models = [MovingGain(loop) for loop in loops]
     m = _middle(models[0], best_constant)
     if m is None:
         return None
     half = RADIUS_SHARE * min(model.radius(m) for model in models)
     if half >= NARROWEST_SECTOR:
-        return _certified(models, max(0.0, m - half), m + half, m)
+        return _certify(models, max(0.0, m - half), m + half, m)
     return None
 
 
@@ -325,15 +326,16 @@ def sector_guard(loop: Sampled, lo: float, hi: float) -> Guard | None:
 
     None where it is not certified in every model of the loop.
     """
-    return _certified([MovingGain(each) for each in _larger(loop)], lo, hi, (lo + hi) / 2)
+    return _certify([MovingGain(each) for each in _larger(loop)], lo, hi, (lo + hi) / 2)
 
 
-def _certified(models: list[MovingGain], lo: float, hi: float, middle: float) -> Guard | None:
-    """The sector [lo, hi] with its proof in every model; settled where the widest around `middle` is."""
+def _certify(models: list[MovingGain], lo: float, hi: float, middle: float) -> Guard | None:
+    """Return the sector [lo, hi] with its proof in every model; settled where the widest around `middle` is."""
     proven = tuple(filter(None, (model.proof(lo, hi) for model in models)))
     if len(proven) < len(models):
         return None
-    widest = [(middle - radius, middle + radius) for radius in (model.radius(middle) for model in models)]
+    radii = [model.radius(middle) for model in models]
+    widest = [(middle - radius, middle + radius) for radius in radii]
     return _guard("time-varying", [model.loop for model in models], widest, lo, hi, proven)
 
 
@@ -345,18 +347,18 @@ def _guard(
     hi: float,
     proofs: tuple[CommonLyapunov, ...] = (),
 ) -> Guard:
-    """The guard [lo, hi] of the intervals `found` of some loops, the largest last."""
+    """Return the guard [lo, hi] of the intervals `found` of some loops, the largest last."""
     omitted = not_covered(CONSUMER, loops[0].chain)
-    return Guard(kind, lo, hi, loops[-1].plant.count, _settled(loops, found), proofs, omitted)
+    return Guard(kind, lo, hi, loops[-1].plant.count, _is_settled(loops, found), proofs, omitted)
 
 
 def _middle(model: MovingGain, best_constant: float) -> float | None:
-    """The middle gain of the default rule; None where no gain is stable."""
+    """Return the middle gain of the default rule; None where no gain is stable."""
     # the best constant gain is within this share of half the width of the sector
     inside = 0.8
-    middles = [
-        float(m) for low, high in constant_windows(model.loop) for m in np.linspace(low, high, 62)[1:-1]
-    ]
+    middles: list[float] = []
+    for low, high in constant_windows(model.loop):
+        middles += np.linspace(low, high, 62)[1:-1].tolist()
     radii = np.array([model.radius(m) for m in middles])
     if not (radii > NARROWEST_SECTOR).any():
         return None
@@ -375,8 +377,8 @@ def _middle(model: MovingGain, best_constant: float) -> float | None:
     return inner
 
 
-def _settled(loops: list[Sampled], found: list[tuple[float, float]]) -> bool:
-    """Whether more modes changed nothing, and the modes left out stay stable by their own damping.
+def _is_settled(loops: list[Sampled], found: list[tuple[float, float]]) -> bool:
+    """Return whether more modes changed nothing, and the modes left out stay stable by their own damping.
 
     Never at C = 0.
     """
@@ -389,7 +391,7 @@ def _settled(loops: list[Sampled], found: list[tuple[float, float]]) -> bool:
 
 
 def upper_modes_are_quiet(loop: Sampled, highest: float) -> bool:
-    """Whether the own decay of the upper half of the modes exceeds the bound on the push of the feedback."""
+    """Return whether the own decay of the upper half of the modes exceeds the bound on the push of the feedback."""
     plant = loop.plant
     T = loop.chain.sampling.period
     fed_back = loop.having(MOMENT_GAIN, highest).push
@@ -399,7 +401,7 @@ def upper_modes_are_quiet(loop: Sampled, highest: float) -> bool:
 
 
 def _larger(loop: Sampled) -> list[Sampled]:
-    """The loop, and the same with four times the modes, or three times or twice; at C = 0 with twenty.
+    """Return the loop, and the same with four times the modes, or three times or twice; at C = 0 with twenty.
 
     A number at which two of the damped modes are not distinguished is left out.
     """

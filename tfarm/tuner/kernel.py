@@ -13,6 +13,7 @@ inputs are the two values before: e(t-1), e(t-2).  Then x(t), x(t-1), and option
 
 from __future__ import annotations
 
+from enum import IntEnum
 from math import exp, inf, log1p
 from typing import NamedTuple
 
@@ -40,8 +41,17 @@ CONSUMER = Consumer(
     none=("volts",),
 )
 
-# the inputs; the last is optional
-U_NOW, U_BEFORE, E_BEFORE, E_TWO_BEFORE, X_NOW, X_BEFORE, K_BEFORE = range(7)
+
+class NetworkInput(IntEnum):
+    """Inputs of the network; the last is optional."""
+
+    U_NOW = 0
+    U_BEFORE = 1
+    E_BEFORE = 2
+    E_TWO_BEFORE = 3
+    X_NOW = 4
+    X_BEFORE = 5
+    K_BEFORE = 6
 
 
 class Limits(NamedTuple):
@@ -130,7 +140,7 @@ class SampleBuffers(NamedTuple):
 
 @inlined
 def logistic(z: float) -> float:
-    """1/(1 + e^-z), without overflow."""
+    """Return 1/(1 + e^-z), without overflow."""
     if z >= 0.0:
         return 1.0 / (1.0 + exp(-z))
     small = exp(z)
@@ -139,7 +149,7 @@ def logistic(z: float) -> float:
 
 @compiled
 def guard_gain(z: float, limits: Limits) -> tuple[float, float]:
-    """The gain and its derivative for the output neuron's sum z.
+    """Return the gain and its derivative for the output neuron's sum z.
 
     kappa = ln(1 + e^z) without a guard; lo + (hi - lo)(1 - e^-kappa) with one.
     """
@@ -183,14 +193,14 @@ def gain_gradient(
 
 @inlined
 def copy_into(source: Real, target: Real) -> None:
-    """target = source, element by element: an assignment of arrays takes numba seconds to compile, and a loop none."""
+    """Set target = source, element by element: numba takes seconds to compile an assignment of arrays, a loop none."""
     for i in range(target.size):
         target[i] = source[i]
 
 
 @inlined
 def turn(rows: Real, vector: Real, out: Real) -> None:
-    """out = rows^T vector, in the order of memory."""
+    """Set out = rows^T vector, in the order of memory."""
     out.fill(0.0)
     for j in range(vector.size):
         v = vector[j]
@@ -201,6 +211,7 @@ def turn(rows: Real, vector: Real, out: Real) -> None:
 
 @inlined
 def dot(a: Real, b: Real) -> float:
+    """Return a . b."""
     total = 0.0
     for i in range(a.size):
         total += a[i] * b[i]
@@ -220,16 +231,16 @@ def sense(k: int, setting: Setting, run: TrialSignals, work: SampleBuffers) -> b
     run.moment[k] = dot(model.own, work.state)
     run.u[k] = reference.counted[k] + reference.servo[k] - dot(model.servo, work.state)
     inputs.fill(0.0)
-    inputs[U_NOW] = run.u[k]
-    inputs[X_NOW] = run.x[k]
+    inputs[NetworkInput.U_NOW] = run.u[k]
+    inputs[NetworkInput.X_NOW] = run.x[k]
     if k >= 1:
-        inputs[U_BEFORE] = run.u[k - 1]
-        inputs[E_BEFORE] = run.e[k - 1]
-        inputs[X_BEFORE] = run.x[k - 1]
-        if inputs.size > K_BEFORE:
-            inputs[K_BEFORE] = run.K[k - 1]
+        inputs[NetworkInput.U_BEFORE] = run.u[k - 1]
+        inputs[NetworkInput.E_BEFORE] = run.e[k - 1]
+        inputs[NetworkInput.X_BEFORE] = run.x[k - 1]
+        if inputs.size > NetworkInput.K_BEFORE:
+            inputs[NetworkInput.K_BEFORE] = run.K[k - 1]
     if k >= 2:
-        inputs[E_TWO_BEFORE] = run.e[k - 2]
+        inputs[NetworkInput.E_TWO_BEFORE] = run.e[k - 2]
     for i in range(inputs.size):
         inputs[i] /= setting.scales[i]
     return True
@@ -251,7 +262,7 @@ def act(k: int, setting: Setting, weights: Real, run: TrialSignals, work: Sample
 
 @compiled
 def trial_cost(done: int, numbers: Numbers, run: TrialSignals) -> float:
-    """T times the sum of a x^2/2 + b e^2/2 over the first `done` samples."""
+    """Return T times the sum of a x^2/2 + b e^2/2 over the first `done` samples."""
     total = 0.0
     for k in range(done):
         total += 0.5 * numbers.a * run.x[k] ** 2 + 0.5 * numbers.b * run.e[k] ** 2
@@ -290,16 +301,16 @@ def backward(setting: Setting, weights: Real, run: TrialSignals, work: SampleBuf
         gain_gradient(weights, run.inputs[k], run.hidden[k], by_sum, gradient, by_input)
         for i in range(m):
             by_input[i] /= setting.scales[i]
-        by_u = by_e + by_input[U_NOW] + late_u
-        by_x = T * a * run.x[k] - run.K[k] * by_e + by_input[X_NOW] + late_x
+        by_u = by_e + by_input[NetworkInput.U_NOW] + late_u
+        by_x = T * a * run.x[k] - run.K[k] * by_e + by_input[NetworkInput.X_NOW] + late_x
         turn(model.A, back, spare)
         for i in range(back.size):
             back[i] = spare[i] + model.moment[i] * by_x - model.servo[i] * by_u
-        late_e = later_e + by_input[E_BEFORE]
-        later_e = by_input[E_TWO_BEFORE]
-        late_u = by_input[U_BEFORE]
-        late_x = by_input[X_BEFORE]
-        late_K = by_input[K_BEFORE] if m > K_BEFORE else 0.0
+        late_e = later_e + by_input[NetworkInput.E_BEFORE]
+        later_e = by_input[NetworkInput.E_TWO_BEFORE]
+        late_u = by_input[NetworkInput.U_BEFORE]
+        late_x = by_input[NetworkInput.X_BEFORE]
+        late_K = by_input[NetworkInput.K_BEFORE] if m > NetworkInput.K_BEFORE else 0.0
 
 
 @compiled
@@ -317,8 +328,6 @@ MOST_HIDDEN = 1000
 # of the paper's network; one input more, the gain before, is optional
 PAPER_INPUTS = 6
 PAPER_HIDDEN = 6
-# of the uniform distribution of the initial weights
-HALF_WIDTH = 0.5
 
 
 @frozen
@@ -353,12 +362,12 @@ class Network:
         return np.r_[self.W1.ravel(), self.w2]
 
     def with_weights(self, weights: Real) -> Network:
-        """The network of the same size with these weights (in the order of `weights`)."""
+        """Return the network of the same size with these weights (in the order of `weights`)."""
         first = self.W1.size
         return Network(weights[:first].reshape(self.W1.shape), weights[first:], self.scales)
 
     def gain(self, signals: Real, guard: Limits) -> float:
-        """K for one row of inputs [N m], not scaled; `guard` as in `guard_gain`."""
+        """Return K for one row of inputs [N m], not scaled; `guard` as in `guard_gain`."""
         return float(network_gain(self.weights, signals / self.scales, np.zeros(self.w2.size), guard)[0])
 
 
@@ -367,5 +376,5 @@ def initial_network(seed: int, *, hidden: int = PAPER_HIDDEN, scales: Real | Non
     seed = whole("seed", seed, 0, 2**63 - 1, "a seed is a whole number from 0 to 2^63 - 1")
     hidden = whole("hidden", hidden, 1, MOST_HIDDEN, f"a whole number of neurons from 1 to {MOST_HIDDEN}")
     widths = np.ones(PAPER_INPUTS) if scales is None else np.asarray(scales, dtype=float)
-    draw = np.random.default_rng(seed).uniform(-HALF_WIDTH, HALF_WIDTH, hidden * (widths.size + 1))
+    draw = np.random.default_rng(seed).uniform(-0.5, 0.5, hidden * (widths.size + 1))
     return Network(draw[:-hidden].reshape(hidden, widths.size), draw[-hidden:], widths)

@@ -68,7 +68,7 @@ class DescentSettings(NamedTuple):
 
 @inlined
 def _rms(x: Real) -> float:
-    """The root of the mean square of x."""
+    """Return the root of the mean square of x."""
     total = 0.0
     for k in range(x.size):
         total += x[k] ** 2
@@ -245,8 +245,6 @@ Mode = Literal["trial", "online"]
 Rule = Literal["dynamic", "clipped", "plain"]
 Sensitivity = Literal["one-step", "whole"]
 
-# of learning curves over the seeds
-QUARTILES = (0.25, 0.5, 0.75)
 MOMENTUM = "the momentum factor lies in [0, 1)"
 
 
@@ -340,7 +338,7 @@ class LearningCurves:
         Quantity("final cost, quartiles and median", digits=4, help="over the seeds: 25 %, 50 % and 75 %"),
     ]:
         """Lower quartile, median and upper quartile of the final costs; always some of the costs."""
-        return np.quantile(self.final, QUARTILES, method="nearest").tolist()
+        return quartiles(self.final).tolist()
 
     @property
     def quartile_curves(
@@ -350,7 +348,13 @@ class LearningCurves:
     ]:
         """The same of the cost after each trial (trials,)."""
         names = ("lower_quartile", "median", "upper_quartile")
-        return dict(zip(names, np.quantile(self.costs, QUARTILES, axis=0, method="nearest"), strict=True))
+        return dict(zip(names, quartiles(self.costs), strict=True))
+
+
+def quartiles(costs: Real) -> Real:
+    """Return lower quartile, median and upper quartile over the seeds (seeds, ...); always some of the costs."""
+    found: Real = np.quantile(costs, (0.25, 0.5, 0.75), axis=0, method="nearest")
+    return found
 
 
 def train(trial: Trial, network: Network, guard: Guard, learning: Learning, trials: int) -> Training:

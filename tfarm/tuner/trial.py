@@ -37,7 +37,7 @@ from tfarm.arrays import Real
 from tfarm.case import Case
 from tfarm.dsp import Chain, Measurement, Scenario, Simulation, Simulator, scenario
 from tfarm.dsp.scenarios import TRIAL_COST, TRIAL_DURATION
-from tfarm.dsp.simulate import FOLDED_UP
+from tfarm.dsp.simulate import largest_moment
 from tfarm.dsp.stages import admit
 from tfarm.errors import must_be_known, name_file, require
 from tfarm.files import write_file
@@ -63,9 +63,6 @@ class Cost:
     def __post_init__(self) -> None:
         check_annotated(self, "")
         require(self.a or self.b, "a", self.a, "a and b are both zero: one of them has to be positive")
-
-
-DEFAULT_COST = Cost()
 
 
 @frozen
@@ -138,13 +135,14 @@ class Trial:
         """The cost's weights, the period, the largest moment, and when and how x follows a torque."""
         model = self.model
         sampling = self.loop.chain.sampling
-        bound = float(FOLDED_UP * self.arm.bending_scale)
         delay = sampling.whole_delay
         reply = float(model.moment @ np.linalg.matrix_power(model.A, delay) @ model.B)
-        return kernel.Numbers(self.cost.a, self.cost.b, sampling.period, bound, 1 + delay, reply)
+        return kernel.Numbers(
+            self.cost.a, self.cost.b, sampling.period, largest_moment(self.arm), 1 + delay, reply
+        )
 
     def setting(self, network: Network, guard: kernel.Limits) -> kernel.Setting:
-        """Arguments of the compiled loops, without weights."""
+        """Return the arguments of the compiled loops, without weights."""
         return kernel.Setting(self.model, self.reference, self.numbers, network.scales, guard)
 
     @property
@@ -153,16 +151,16 @@ class Trial:
         return Case(self.arm, self.loop.gains, self.loop.chain)
 
     def on(self, case: Case) -> Trial:
-        """The same slew in another case, with the references of this one's arm."""
+        """Return the same slew in another case, with the references of this one's arm."""
         return replace(self, loop=sampled_loop(case, count=self.loop.plant.count))
 
     def simulator(self, chain: Chain | None = None) -> Simulator:
-        """A simulator of the loop, with the converters of a chain, by default that of the trial."""
+        """Return a simulator of the loop, with the converters of a chain, by default that of the trial."""
         case = self.case if chain is None else self.case.through(chain)
         return Simulator(case, self.task, count=self.loop.plant.count)
 
     def room(self, network: Network) -> tuple[kernel.TrialSignals, kernel.SampleBuffers]:
-        """Empty record and buffers of a trial with that network."""
+        """Return an empty record and buffers of a trial with that network."""
         hidden, inputs = network.W1.shape
         n = self.n
         states = self.model.B.size
@@ -172,18 +170,24 @@ class Trial:
     # ------------------------------------------------------------ one trial
 
     def with_network(self, network: Network, guard: kernel.Limits) -> Record:
-        """The trial with a fixed network; the cost is inf where it was stopped."""
+        """Return the trial with a fixed network; the cost is inf where it was stopped."""
         run, work = self.room(network)
         done = int(kernel.forward(self.setting(network, guard), network.weights, run, work))
         is_whole = done == self.n
         cost = float(kernel.trial_cost(done, self.numbers, run)) if is_whole else math.inf
-        t, x, u, e, K, moment = (
-            each[:done] for each in (self.task.t, run.x, run.u, run.e, run.K, run.moment)
+        return Record(
+            t=self.task.t[:done],
+            x=run.x[:done],
+            u=run.u[:done],
+            e=run.e[:done],
+            K=run.K[:done],
+            moment=run.moment[:done],
+            cost=cost,
+            stopped=None if is_whole else done,
         )
-        return Record(t, x, u, e, K, moment, cost, None if is_whole else done)
 
     def with_constant(self, K: float) -> Record:
-        """The trial with a constant gain: a guard of one gain, for any network."""
+        """Return the trial with a constant gain: a guard of one gain, for any network."""
         silent = Network(np.zeros((1, PAPER_INPUTS)), np.zeros(1), np.ones(PAPER_INPUTS))
         return self.with_network(silent, kernel.Limits(K, K))
 
@@ -194,7 +198,7 @@ def slew_trial(
     *,
     K1: float | None = None,
     Kp: float = 0.0,
-    cost: Cost = DEFAULT_COST,
+    cost: Cost | None = None,
     signals: MomentReading = "vibration",
     duration: float = TRIAL_DURATION,
     count: int = TRIAL_MODES,
@@ -214,7 +218,7 @@ def slew_trial(
     require(length >= rise, "duration", length, f"a trial lasts at least as long as its slew, {rise:g} s")
     must_not_be_algebraic(arm, "hub.inertia", 0.0)
     loop = sampled_loop(Case(arm, gains, chain), count=count)
-    return Trial(loop, scenario("slew", arm, chain, length), cost, signals)
+    return Trial(loop, scenario("slew", arm, chain, length), Cost() if cost is None else cost, signals)
 
 
 def usual_rate_gain(arm: Arm, Kp: float) -> float:
@@ -230,7 +234,7 @@ def usual_rate_gain(arm: Arm, Kp: float) -> float:
 
 
 def with_signals(chain: Chain, signals: MomentReading) -> Chain:
-    """The chain with that reading of the moment during the slew."""
+    """Return the chain with that reading of the moment during the slew."""
     return replace(chain, slew=replace(chain.slew, reading=signals))
 
 
@@ -242,7 +246,6 @@ def residual_rms(record: Record, task: Scenario) -> float | None:
     return task.residual_rms(record.moment)
 
 
-FORMAT: Literal["tfarm tuner 1"] = "tfarm tuner 1"
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -264,7 +267,7 @@ class TunedGain:
         return simulator.gain_schedule(self.servo.K1, self, Kp=self.servo.Kp)
 
     def __call__(self, m: Measurement) -> float:
-        """The gain at this sample."""
+        """Return the gain at this sample."""
         if m.k == 0:
             self._past = (0.0,) * 5
         u1, e1, x1, K1, e2 = self._past
@@ -293,7 +296,7 @@ def record_of_simulation(simulation: Simulation, cost: Cost, signals: MomentRead
 
 
 def tip_off(simulation: Simulation, trial: Trial) -> float | None:
-    """Distance of the tip from its target [m] at the end of a simulated slew; None of an unstable loop."""
+    """Return the distance of the tip from its target [m] at the end of a simulated slew; None of an unstable loop."""
     if simulation.stopped is not None:
         return None
     travel = trial.loop.chain.slew.travel_of(trial.arm.reach)
@@ -331,7 +334,7 @@ class SavedTuner(StrictTable):
         return Network(np.array(self.W1), np.array(self.w2), np.array(self.scales))
 
     def gain(self) -> TunedGain:
-        """The controller.  Raises ParameterError where the parts of the tuner do not match."""
+        """Return the controller.  Raises ParameterError where the parts of the tuner do not match."""
         is_free = self.guard_kind == "none"
         require(
             (self.guard is None) == is_free, "guard", self.guard, "two ends, or null with guard_kind none"
@@ -342,11 +345,9 @@ class SavedTuner(StrictTable):
 
 
 def to_text(tuner: SavedTuner) -> str:
-    """Text of a tuner's file; equal tuners give equal text, and it loads to the same bits."""
-    return (
-        json.dumps(tuner.model_dump(exclude_defaults=True), indent=1, allow_nan=False, ensure_ascii=False)
-        + "\n"
-    )
+    """Return the text of a tuner's file; equal tuners give equal text, and it loads to the same bits."""
+    numbers = tuner.model_dump(exclude_defaults=True)
+    return json.dumps(numbers, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def save_tuner(tuner: SavedTuner, path: Path) -> None:

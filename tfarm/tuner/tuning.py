@@ -17,7 +17,7 @@ from tfarm.case import Case
 from tfarm.dsp import Chain, scenario
 from tfarm.dsp.results import Run, simulate_modes
 from tfarm.dsp.scenarios import TRIAL_DURATION, TRIAL_SLEWS, describe_scenario, torque_unit
-from tfarm.dsp.simulate import RESIDUAL
+from tfarm.dsp.simulation import RESIDUAL
 from tfarm.errors import require
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -27,7 +27,6 @@ from tfarm.tuner.guard import Guard, GuardKind, find_guard
 from tfarm.tuner.kernel import PAPER_HIDDEN, PAPER_INPUTS, Network, initial_network
 from tfarm.tuner.training import Learning, LearningCurves, Training, train
 from tfarm.tuner.trial import (
-    FORMAT,
     TRIAL_MODES,
     Cost,
     Record,
@@ -78,7 +77,7 @@ class Plan:
         check_annotated(self, "")
 
     def trial(self, arm: Arm, chain: Chain | None) -> Trial:
-        """The trial on an arm, with the weights of the cost on moments and torques in units of the scale."""
+        """Return the trial on an arm, with the weights of the cost on moments and torques in units of the scale."""
         return slew_trial(
             arm,
             chain,
@@ -91,7 +90,7 @@ class Plan:
         )
 
     def network(self, seed: int) -> Network:
-        """The network with the first weights of a seed."""
+        """Return the network with the first weights of a seed."""
         return initial_network(
             seed,
             hidden=self.hidden,
@@ -122,12 +121,12 @@ class Tuning:
         return "cost {:.6g}; {:.6g} with the best constant gain, {:.6g} without".format(*costs)
 
     def saved(self) -> SavedTuner:
-        """The record that `save_tuner` writes."""
+        """Return the record that `save_tuner` writes."""
         guard = self.training.guard
         plan = self.plan
         network = self.training.network
         return SavedTuner(
-            format=FORMAT,
+            format="tfarm tuner 1",
             arm=self.trial.arm.name,
             period=self.trial.task.period,
             K1=plan.K1,
@@ -143,7 +142,7 @@ class Tuning:
         )
 
     def gain(self) -> TunedGain:
-        """The trained controller."""
+        """Return the trained controller."""
         return self.saved().gain()
 
     @property
@@ -251,7 +250,7 @@ class SlewEnd(NamedTuple):
 
     @classmethod
     def of(cls, tuning: Tuning) -> SlewEnd:
-        """The end of the trial of a tuning."""
+        """Return the end of the trial of a tuning."""
         simulator = tuning.trial.simulator()
         gain = tuning.gain()
         runs = gain.run(simulator), simulator.linear(tuning.constant), simulator.linear(gain.servo)
@@ -286,18 +285,9 @@ class TuningResult:
     ) -> Annotated[dict[str, Any], Quantity("plan", flat=True, help="options of learning, servo and cost")]:
         """Mode, rule, constants and seed of the learning, gains of the servo, and weights of the cost."""
         plan = self.tuning.plan
-        return {
-            "mode": plan.learning.mode,
-            "rule": plan.learning.rule,
-            "sensitivity": plan.learning.sensitivity,
-            "signals": plan.signals,
-            "seed": plan.seed,
-            "K1": plan.K1,
-            "Kp": plan.Kp,
-            "a": plan.cost.a,
-            "b": plan.cost.b,
-            "cost_unit_N_m": plan.scale,
-        }
+        found = {name: getattr(plan.learning, name) for name in ("mode", "rule", "sensitivity")}
+        found |= {name: getattr(plan, name) for name in ("signals", "seed", "K1", "Kp")}
+        return found | {"a": plan.cost.a, "b": plan.cost.b, "cost_unit_N_m": plan.scale}
 
     @property
     def trials(self) -> Annotated[int, Quantity("trials", help="slews of the training")]:
@@ -352,7 +342,8 @@ class TuningResult:
         self,
     ) -> Annotated[dict[str, Real], Quantity(help="moment gain K at the times t of the tuned slew")]:
         """The moment gain over time, tuned."""
-        return {"t": self.tuning.training.result.t, "K": self.tuning.training.result.K}
+        slew = self.tuning.training.result
+        return {"t": slew.t, "K": slew.K}
 
     @property
     def gain_range(
@@ -361,7 +352,7 @@ class TuningResult:
         tuple[float, float], Quantity("moment gain", digits=4, help="least and largest during the tuned slew")
     ]:
         """The least and the largest moment gain."""
-        K = self.gain["K"]
+        K = self.tuning.training.result.K
         return float(K.min()), float(K.max())
 
     @cached_property

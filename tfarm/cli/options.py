@@ -1,0 +1,310 @@
+"""Options that commands share, and what they name: the arm, the law, the case and the chain."""
+
+from cmath import inf, isnan
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import typer
+
+import tfarm
+from tfarm.arm import ANGLE_GAIN, PLANE, AnyLaw, Arm, Theory, implausible
+from tfarm.arm.reading import ArmFile, load_tables
+from tfarm.cli.progress import print_line
+from tfarm.errors import require
+
+if TYPE_CHECKING:
+    from tfarm.arm.chain import Chain
+
+
+def preset_names(incomplete: str) -> list[str]:
+    """Return the presets that begin so, for the completion of a shell."""
+    return [name for name in tfarm.presets() if name.startswith(incomplete)]
+
+
+def read_arm(name: str) -> ArmFile:
+    """Return the tables of a preset or file, for all that a command makes of them."""
+    return load_tables(name)
+
+
+def read_arms(names: Any) -> list[ArmFile]:
+    """Return those of several; none of None."""
+    return [load_tables(name) for name in names or ()]
+
+
+def numbers(
+    form: str, count: int = 0, kind: Callable[[str], Any] = float
+) -> Callable[[str], tuple[Any, ...]]:
+    """Return the parser of numbers that commas separate, `count` of them or any; `form` is that of the option."""
+
+    def parse(text: str) -> tuple[Any, ...]:
+        with suppress(ValueError):
+            found = tuple(kind(part.strip()) for part in text.split(","))
+            if len(found) == (count or len(found)) and not any(map(isnan, found)):
+                return found
+        raise typer.BadParameter(f"{text!r}: write {form}")
+
+    return parse
+
+
+def interval(text: str) -> tuple[float, ...]:
+    """Return the two numbers of LOW,HIGH."""
+    low, high = numbers("LOW,HIGH", 2)(text)
+    if not -inf < low < high < inf:
+        raise typer.BadParameter(f"{text!r}: write LOW,HIGH, the lower number first, such as -1,3")
+    return low, high
+
+
+def name_and(parser: Callable[[str], Any]) -> Callable[[str], tuple[str, Any]]:
+    """Return the parser of NAME=VALUE, with one for the value."""
+
+    def parse(text: str) -> tuple[str, Any]:
+        name, _, value = text.partition("=")
+        return name.strip(), parser(value)
+
+    return parse
+
+
+def check_figure(path: Path | None) -> Path | None:
+    """Return the name of a file of a figure; one without a suffix, such as "-", is a PNG."""
+    if path is not None and path.suffix.lower() not in ("", ".png", ".svg", ".pdf"):
+        raise typer.BadParameter(f"{str(path)!r}: give a name that ends in .png, .svg or .pdf")
+    return path
+
+
+# groups of options
+CONTROLLER = "Controller"
+
+
+SAMPLING = "Sampling"
+
+
+# in a command the tables of that file, read and parsed once
+ArmName = Annotated[
+    Any,
+    typer.Argument(
+        metavar="ARM",
+        help="preset or TOML file",
+        parser=str,
+        callback=read_arm,
+        autocompletion=preset_names,
+        show_default=False,
+    ),
+]
+
+
+TheoryName = Annotated[
+    Theory | None, typer.Option("--theory", help="beam theory; by default that of the arm's file")
+]
+
+
+Png = Annotated[
+    Path | None,
+    typer.Option(
+        "--figure",
+        "--png",
+        metavar="FILE",
+        callback=check_figure,
+        help="draw the picture into this file: .png, or .pdf or .svg at the width of a paper's column",
+    ),
+]
+
+
+# to be written
+File = Annotated[Path | None, typer.Option(metavar="FILE")]
+
+
+InputName = Annotated[
+    str | None,
+    typer.Option(
+        "--input", help="hub_torque, motor_voltage, motor_current, hub_angle, force@X or moment_pair@X1,X2"
+    ),
+]
+
+
+ModeCount = Annotated[int, typer.Option("--modes", min=1, max=30, help="flexible modes")]
+
+
+LawFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--law",
+        metavar="FILE",
+        exists=True,
+        help="TOML file with a [law]; by default that of the arm's file",
+        rich_help_panel=CONTROLLER,
+    ),
+]
+
+
+LawFiles = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--law",
+        metavar="FILE",
+        exists=True,
+        help="TOML file with a [law]; may be repeated",
+        rich_help_panel=CONTROLLER,
+    ),
+]
+
+
+AngleGain = Annotated[
+    float, typer.Option(f"--{ANGLE_GAIN}", help="hub angle gain", rich_help_panel=CONTROLLER)
+]
+
+
+def gains_of_options(
+    *,
+    K1: Annotated[
+        float | None,
+        typer.Option(
+            "--K1",
+            help="hub rate gain [N m s/rad, V s/rad or A s/rad]; by default 0.00642 J w1 (0.3 on the paper's arm)",
+            rich_help_panel=CONTROLLER,
+        ),
+    ] = None,
+    K2: Annotated[
+        float | None,
+        typer.Option(
+            "--K2",
+            help="root moment gain, u = ... - K2 E I phi'(0); by default 0.3, 0 without hub inertia",
+            rich_help_panel=CONTROLLER,
+        ),
+    ] = None,
+    Kp: Annotated[
+        float | None,
+        typer.Option("--Kp", help="hub angle gain [N m/rad]; by default 0", rich_help_panel=CONTROLLER),
+    ] = None,
+) -> dict[str, float]:
+    """Return the gains that are given, by name."""
+    return without_none({"K1": K1, "K2": K2, "Kp": Kp})
+
+
+def without_none(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values that are not None, by name."""
+    return {name: value for name, value in values.items() if value is not None}
+
+
+# ------------------------------------------------------------ the records that they name
+
+
+def load_arm(file: ArmFile, theory: Theory | None = None, driven: str | None = None) -> Arm:
+    """Return the arm of a file, under that theory.
+
+    Values that look like a wrong unit, and a motor without an input (`arm_under_chain` or the file's), are named on
+    standard error.
+    """
+    arm = tfarm.load(file)
+    if "motor" in file.tables and "input" not in file.tables and driven is None:
+        print_line(
+            f"warning: {file.name}: input: not given with a [motor], {arm.input} is assumed. "
+            "Set input to hub_torque, motor_voltage or motor_current at the top of the file."
+        )
+    if theory is not None:
+        arm = arm.under(theory)
+    if texts := implausible(arm):
+        print_line(f"warning: {arm.name}: {'; '.join(texts)}")
+    return arm
+
+
+def law_of_options(
+    file: ArmFile, arm: Arm, gains: Mapping[str, float], other: Path | ArmFile | None = None
+) -> tuple[AnyLaw, dict[str, Any]]:
+    """Return the law of another file, of the gains given, or of the arm's own [law], and JSON's part of default gains.
+
+    `default_gains` names those that are not given and have a default, `default_gains_in_words` is their values.
+    """
+    from tfarm.arm.law_tables import load_law
+    from tfarm.spectrum.gains import default_words
+
+    if other is not None:
+        file = load_tables(other)
+        refuse(
+            gains,
+            f"the law is that of {file.name}; leave this out",
+        )
+    own = None if gains else load_law(file)
+    if own is not None:
+        return own, {}
+    require(other is None, "--law", file.name, "has no table [law]")
+    missing = [gain for gain in PLANE if gain not in gains]
+    words = default_words(arm, missing) if missing else None
+    return replace(tfarm.default_gains(arm), **gains), {
+        "default_gains": missing,
+        "default_gains_in_words": words,
+    }
+
+
+def load_loop(
+    file: ArmFile, *, law: LawFile = None, theory: TheoryName = None, gains: Any = gains_of_options
+) -> tuple[Any, dict[str, Any]]:
+    """Return the `tfarm.Case` of a command, through the usual chain, and JSON's part of default gains."""
+    arm = load_arm(file, theory)
+    controller, defaults = law_of_options(file, arm, gains(), law)
+    return tfarm.Case(arm, controller), defaults
+
+
+def load_driven_loop(file: ArmFile, *, loop: Any = load_loop) -> tuple[Any, dict[str, Any]]:
+    """Return the same of a command without sampling, through the chain of the file and with its analog damping."""
+    from tfarm.dsp.plant import arm_under_chain
+
+    case, defaults = loop(file)
+    arm, chain = arm_under_chain(case.arm, chain_of_options(file))
+    return case.on(arm).through(chain), defaults
+
+
+def chain_of_options(
+    file: str | ArmFile,
+    *,
+    period: Annotated[
+        float | None,
+        typer.Option(
+            "--period", help="sampling period [s]; by default the file's, or 0.01", rich_help_panel=SAMPLING
+        ),
+    ] = None,
+    delay_samples: Annotated[
+        float | None,
+        typer.Option(
+            "--delay-samples", help="computational delay in samples, any fraction", rich_help_panel=SAMPLING
+        ),
+    ] = None,
+    dsp: Annotated[
+        str | None,
+        typer.Option(
+            "--dsp",
+            metavar="FILE",
+            rich_help_panel=SAMPLING,
+            help="TOML file with [sampling], [converters], [actuator], [slew]; by default that of the arm",
+        ),
+    ] = None,
+) -> "Chain":
+    """Return the sampled chain of a file, or of the arm's, with the period and the delay that are given instead."""
+    from tfarm.arm.chain import load_chain
+
+    chain = load_chain(dsp or file)
+    sampling = replace(chain.sampling, **without_none({"period": period, "delay_samples": delay_samples}))
+    return replace(chain, sampling=sampling, period_from=chain.period_from if period is None else "--period")
+
+
+def outputs_on(
+    names: Sequence[str],
+    *,
+    x: Annotated[float | None, typer.Option("--x", help="place on the arm [m], for outputs along it")] = None,
+    side: Annotated[
+        str | None,
+        typer.Option("--side", help="outer (default) or inner side of a joint, for outputs along the arm"),
+    ] = None,
+) -> tuple[list[Any], float | None]:
+    """Return the outputs of these names, on one side of a joint where that is given, and the place of those along."""
+    from tfarm.exact.outputs import on_side
+
+    return [name if side is None else on_side(name, cast("Any", side)) for name in names], x
+
+
+def refuse(others: Mapping[str, Any], remedy: str) -> None:
+    """Raise ParameterError for an option, by its name as a parameter, that another one excludes."""
+    for name, value in others.items():
+        require(value is None or value is False, f"--{name.replace('_', '-')}", value, remedy)
