@@ -171,7 +171,7 @@ def some_loop(rng):
         period = float(f"{2 * math.pi / w / rng.uniform(30, 60):.3g}")
         chain = replace(
             shaped(period=period),
-            slew=Slew(travel=1e-3 * arm.reach, rise_time=float(f"{2 * math.pi / w * rng.uniform(1, 4):.3g}")),
+            slew=Slew(travel=1e-6 * arm.reach, rise_time=float(f"{2 * math.pi / w * rng.uniform(1, 4):.3g}")),
         )
         if sampled_loop(Case(arm, law, chain)).is_stable:
             return arm, law, chain

@@ -20,7 +20,7 @@ from tests.shared import thinned
 from tests.studies.pictured import planted_study
 from tfarm import Law
 from tfarm.digits import plain
-from tfarm.dsp import Chain
+from tfarm.dsp import Chain, ReferenceShaping
 from tfarm.fitting.data import Measured
 from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.loci import reduced_locus
@@ -36,7 +36,17 @@ LAB = tfarm.load("sasaki2012-lab")
 MICRO = Path(__file__).parents[1] / "data" / "reproductions" / "micro2.toml"
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
 LEAD = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_deflection": ([0.5], [0.02, 1.0])})
-AXES = {"comparison": 3, "bode": 2, "loop": 2, "measured_response": 3, "modes": 3, "slew": 3, "step": 4, "study": 4}
+AXES = {
+    "comparison": 3,
+    "bode": 2,
+    "loop": 2,
+    "measured_response": 3,
+    "modes": 3,
+    "reference": 2,
+    "slew": 3,
+    "step": 4,
+    "study": 4,
+}
 AXES |= {"study_scatter": 6}  # of a plot that has several
 PICTURES = sorted({*tfarm.plots.__all__} - {"animate", "column"})
 OTHERS = [f"{name} of a rig" for name in ("gain_map", "nyquist", "disc", "bode", "locus", "loop", "nichols")]
@@ -82,6 +92,7 @@ def records(tmp_path_factory):
         "slew": lambda: [LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)],
         **dict.fromkeys(("study", "study_band", "study_scatter"), lambda: [study()]),
         "step": lambda: [tfarm.step(LAB, LAW, scenario_name="slew", duration=2.0)],
+        "reference": lambda: [tfarm.reference(LAB, LAW, Chain(reference=ReferenceShaping(shaper="ZV")))],
         "locus of a law": lambda: [tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 10, 3)],
         "gain_map of a law": lambda: [tfarm.map(LAB, factors, delays, law=LEAD, vary=("gain", "delay"))],
         "bode of a rig": lambda: [tfarm.bode(rig, "root_moment", (1.0, 1000.0))],

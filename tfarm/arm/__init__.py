@@ -7,7 +7,7 @@ materials   materials of links
 feedback    HubFeedback: the paper's law, and the table of its gains
 law         Law: a linear law from named signals to the input
 blocks      the blocks of a law: ratios of polynomials and state spaces
-chain       Chain: sampling, converters, actuator and slew
+chain       Chain: sampling, converters, actuator, slew and its reference
 stages      what happens in one sample, stage by stage
 schema      the tables of an arm's file and their keys
 law_tables  the table [law] of a file

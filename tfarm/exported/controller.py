@@ -63,7 +63,7 @@ CONSUMER = Consumer(
     ),
     named=("encoder", "amplifier steps", "arithmetic"),
     partly=("amplifier range",),
-    none=("reference", "volts"),
+    none=("reference", "shaper", "volts"),
 )
 
 # in C

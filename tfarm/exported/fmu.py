@@ -57,7 +57,7 @@ CONSUMER = Consumer(
         "hub damping",
         "plant",
     ),
-    none=("reference", "volts"),
+    none=("reference", "shaper", "volts"),
 )
 
 MEASURED = "measured:"

@@ -59,7 +59,7 @@ CONSUMER = Consumer(
         "torque limit",
         "arithmetic",
     ),
-    none=("reference", "volts"),
+    none=("reference", "shaper", "volts"),
 )
 
 # exact, and of either precision with another number

@@ -32,8 +32,15 @@ from tfarm.synthesis.drawn import AnyStudy, Verification, drawn_arms, verify, vi
 from tfarm.synthesis.goals import Checked
 from tfarm.synthesis.judge import LOST, OBJECTIVES, TOO_SLOW, Judge, judge_of, model_sizes
 from tfarm.synthesis.models import slew_and_after, trial_slew
-from tfarm.synthesis.required import RequiredLaw, RequirementTask, Sensitivity, is_active, names_of, why_none
-from tfarm.synthesis.requirements import MEASURES, Wanted, measure_named, requirements_of
+from tfarm.synthesis.required import (
+    RequiredLaw,
+    RequirementSlope,
+    RequirementTask,
+    is_active,
+    names_of,
+    why_none,
+)
+from tfarm.synthesis.requirements import MEASURES, RequirementList, measure_named, requirements_of
 from tfarm.synthesis.search import Search, Worst, flat_part, search
 from tfarm.synthesis.structures import STRUCTURES, Bounds, Structure, check_bounds, structure_of
 from tfarm.synthesis.trade_off import TradeOff, front
@@ -193,7 +200,7 @@ class Design:
         tuple[str, ...], Quantity("alternatives", help="structures whose best law meets all requirements")
     ] = ()
     sensitivities: Annotated[
-        tuple[Sensitivity, ...],
+        tuple[RequirementSlope, ...],
         Quantity("sensitivities", help="changes of the required quantities, sampled loop, by the model"),
     ] = ()
 
@@ -291,7 +298,7 @@ def design(
     arm: Arm,
     objective: str | None = None,
     *,
-    require: Wanted | None = None,
+    require: RequirementList | None = None,
     structure: str = TWO_GAINS,
     K1: Bounds | None = None,
     K2: Bounds | None = None,
@@ -385,7 +392,7 @@ def trade_off(
     arm: Arm,
     objective: str | None = None,
     *,
-    require: Wanted | None = None,
+    require: RequirementList | None = None,
     structure: str = TWO_GAINS,
     K1: Bounds | None = None,
     K2: Bounds | None = None,
@@ -452,7 +459,9 @@ class _Options:
             check_bounds(form, each.arm)
         return arms, form
 
-    def task(self, objective: str | None, wanted: Wanted | None) -> tuple[RequirementTask, list[NamedArm]]:
+    def task(
+        self, objective: str | None, wanted: RequirementList | None
+    ) -> tuple[RequirementTask, list[NamedArm]]:
         """Return the search for a law that meets requirements, and its arms."""
         if objective is None:
             # an arm that cannot turn has no slew

@@ -62,7 +62,7 @@ class RequiredLaw(NamedTuple):
         return max((each.violation for each in self.checked), default=0.0)
 
 
-class Sensitivity(NamedTuple):
+class RequirementSlope(NamedTuple):
     """The change of a required quantity with a coefficient."""
 
     requirement: Annotated[str, Quantity("requirement", help="as after --require")]
@@ -230,7 +230,7 @@ class RequirementTask:
                 found.append(str(each))
         return tuple(found)
 
-    def sensitivities(self, choice: RequiredLaw) -> list[Sensitivity]:
+    def sensitivities(self, choice: RequiredLaw) -> list[RequirementSlope]:
         """Return the changes of the required quantities of the sampled loop by the model of the first arm."""
         judge = choice.worst.judges[0]
         form = choice.search.form
@@ -246,7 +246,7 @@ class RequirementTask:
                 if not each.measure.of_slew:
                     values = loop.of(each.name)
                     slope = float(values[0] - values[1]) / (2 * change) / 100
-                    found.append(Sensitivity(str(each), coefficient, slope))
+                    found.append(RequirementSlope(str(each), coefficient, slope))
         return found
 
 

@@ -101,10 +101,10 @@ def measure_named(word: str, key: str) -> str:
 
 
 # a list in a text, a limit for each name, or requirements
-Wanted = str | Mapping[str, float | str] | Sequence[Requirement]
+RequirementList = str | Mapping[str, float | str] | Sequence[Requirement]
 
 
-def requirements_of(wanted: Wanted) -> tuple[Requirement, ...]:
+def requirements_of(wanted: RequirementList) -> tuple[Requirement, ...]:
     """Return the requirements of a text, a table, or a sequence of them.
 
     A text is a list such as "GM>=6, PM>=45, damping>=2%"; "good" stands for the limits of the grade.  A table has a
