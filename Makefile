@@ -33,6 +33,7 @@ SURVEYS := \
 	loop.settled \
 	loop.law_orders \
 	loop.single_laws \
+	loop.norms \
 	fitting.planted \
 	studies.kills \
 	studies.planted \

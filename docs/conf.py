@@ -17,7 +17,7 @@ from typer.cli import get_docs_for_click
 
 import tfarm
 from tfarm.arm.chain import CHAIN_TABLES
-from tfarm.arm.law_tables import LawTable, SignalTable
+from tfarm.arm.law_tables import LawTable, SignalTable, WeightTable
 from tfarm.arm.materials import materials
 from tfarm.arm.schema import PART_TABLES, SHAPE_TABLES, ArmTable, StrictTable, file_keys
 from tfarm.arm.stages import ARM_KEYS, STAGES
@@ -94,6 +94,7 @@ FILE_TABLES: dict[str, type[StrictTable]] = {
     **{f'link.section] with shape = "{shape}': table for shape, table in SHAPE_TABLES.items()},
     "law": LawTable,
     "law.SIGNAL": SignalTable,
+    "weights": WeightTable,
     **CHAIN_TABLES,
     "measured": RunTable,
 }

@@ -30,12 +30,14 @@ from tfarm.fitting.fit import fit as fit
 from tfarm.fitting.overlay import overlay as overlay
 from tfarm.loop.locus import locus as locus
 from tfarm.loop.margins import margins as margins
+from tfarm.loop.norms import norm as norm
 from tfarm.loop.nyquist import nyquist as nyquist
 from tfarm.loop.plane import gain_map
 from tfarm.loop.poles import closed_loop_poles as closed_loop_poles
 from tfarm.loop.sampled_analysis import sampled as sampled
 from tfarm.loop.spillover import spill as spill
 from tfarm.reduced import reduce as reduce
+from tfarm.references import reference as reference
 from tfarm.report.live import explore as explore
 from tfarm.response import bode as bode
 from tfarm.response import transfer as transfer

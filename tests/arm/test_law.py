@@ -3,6 +3,7 @@
 Laws as files: there and back to the last bit, whatever they hold.
 """
 
+from dataclasses import replace
 from textwrap import dedent
 
 import control
@@ -15,6 +16,7 @@ from tfarm import HubFeedback, Law, ParameterError
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.writing import law_toml, save_law
+from tfarm.dsp.discretise import back_calculation
 
 S = np.array([0.3j, 2 + 3j, -1.5 + 40j])
 
@@ -209,3 +211,18 @@ def test_there_and_back(seed, tmp_path):
     assert law_toml(again) == law_toml(law)
     both = Law.of_matrices([[-1.0]], [[1.0, 0.5]], [[1.0]], [[0.0, 0.0]], ["hub_angle", "hub_rate"])
     assert "savemat" in str(refusal(law_toml, both))
+
+
+def test_anti_windup_is_of_one_integrator(tmp_path):
+    law = Law({"hub_angle": ([2.0, 1.0], [1.0, 0.0])}, anti_windup=0.5)
+    save_law(law, tmp_path / "law.toml")
+    assert "anti_windup = 0.5" in (tmp_path / "law.toml").read_text()
+    assert load_law(tmp_path / "law.toml") == law
+    assert "anti_windup" not in law_toml(replace(law, anti_windup=0.0))
+    for den, Tt, words in (([1.0, 2.0], 0.5, "has none"), ([1.0, 0.0], -1.0, "a time constant")):
+        assert words in str(refusal(Law, {"hub_angle": ([2.0, 1.0], den)}, anti_windup=Tt))
+    limits = (-1.0, 1.0)
+    for den in ([1.0, -2.0, 1.0], [1.0, -0.5]):
+        bad = Law({"hub_angle": ([1.0], den)}, period=0.01, anti_windup=0.5)
+        assert "one integrator" in str(refusal(back_calculation, bad, limits))
+    assert back_calculation(law, (-np.inf, np.inf)).tolist() == [-np.inf, np.inf]

@@ -25,7 +25,7 @@ from tfarm.arm import (
     to_toml,
 )
 from tfarm.arm.chain import CHAIN_TABLES, chain_of_tables
-from tfarm.arm.law_tables import LawTable, SignalTable
+from tfarm.arm.law_tables import LawTable, SignalTable, WeightTable
 from tfarm.arm.schema import PART_TABLES, SHAPE_TABLES, ArmTable, LinkTable, arm_of_table, file_keys
 from tfarm.fitting.recording import RunTable
 
@@ -220,7 +220,7 @@ def test_an_arm_or_rig_written_and_read_is_the_same_to_the_last_bit(tmp_path_fac
 
 FILE_TABLES = {
     "top": [ArmTable], "link": [LinkTable], "link.section": SHAPE_TABLES.values(), "law": [LawTable],
-    "law.SIGNAL": [SignalTable], "measured": [RunTable],
+    "law.SIGNAL": [SignalTable], "weights": [WeightTable], "measured": [RunTable],
     **{name: [table] for name, table in (PART_TABLES | CHAIN_TABLES).items() if name != "link"},
 }  # fmt: skip
 

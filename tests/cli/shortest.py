@@ -16,6 +16,7 @@ OF_AN_ARM = {
     "map": "--K1 -1,3 --K2 -2,2 --points 5",
     "step": "--duration 1",
     "sampled": "--modes 3",
+    "norm": "--weight S=1,1/1,0.1",
     "simulate": "--scenario decay --duration 0.2 --modes 3",
     "design": "--structure PD",
     "export": "--what plant --as py --out OUT",

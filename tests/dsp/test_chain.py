@@ -9,7 +9,7 @@ import pytest
 import tfarm
 from tfarm.arm import to_toml
 from tfarm.arm.chain import chain_of_tables, file_text
-from tfarm.dsp import Actuator, Chain, Converters, Sampling, Slew, load_chain
+from tfarm.dsp import Actuator, Chain, Converters, ReferenceShaping, Sampling, Slew, load_chain
 from tfarm.dsp.kernel import quantise
 from tfarm.errors import ParameterError
 
@@ -37,6 +37,10 @@ hub_damping = 0.05
 travel = 0.5
 rise_time = 0.8
 reading = "total"
+[reference]
+profile = "s-curve"
+shaper = "EI"
+modes = 3
 """
 
 
@@ -63,6 +67,7 @@ def test_one_file_may_hold_the_arm_and_its_loop(tmp_path):
         ),
         actuator=Actuator(torque_limit=6.0, motor_constant=0.8, hub_damping=0.05),
         slew=Slew(travel=0.5, rise_time=0.8, reading="total"),
+        reference=ReferenceShaping(profile="s-curve", shaper="EI", modes=3),
     )  # fmt: skip
     alone = tmp_path / "loop.toml"
     alone.write_text(LOOP, encoding="utf-8")

@@ -13,7 +13,7 @@ from tfarm import Law, ParameterError
 from tfarm.arm import FED_BACK, HubFeedback
 from tfarm.arm.law_tables import load_law
 from tfarm.case import Case, tracked
-from tfarm.dsp import Chain, Sampling, Simulator, load_chain, scenario
+from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, load_chain, scenario
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_verdict import sampled_verdict
 
@@ -105,3 +105,51 @@ def test_real_controllers_bring_the_rig_to_the_reference_within_the_current():
         assert found.stopped is None
         assert abs(found.torque).max() <= 0.9
         assert found.at_samples.hub_angle[-1] == pytest.approx(wanted, rel=0.02)
+
+
+KP, KI, KD, POLE = 8.0, 8.0, 4.0, 50.0
+
+
+def limited(anti_windup, limit, arithmetic="float64"):
+    """A slew under PID of a hub whose motor reaches its limit."""
+    num = [KD + KP / POLE, KP + KI / POLE, KI]
+    law = Law({"hub_angle": (num, [1 / POLE, 1.0, 0.0])}, references=("hub_angle",), anti_windup=anti_windup)
+    chain = Chain(actuator=Actuator(torque_limit=limit), converters=Converters(arithmetic=arithmetic))
+    return Simulator(Case(LAB, law, chain), scenario("slew", LAB, chain, 8.0), count=6)
+
+
+@pytest.mark.parametrize("arithmetic", ["float64", "float32"])
+def test_anti_windup_changes_no_bit_without_a_limit(arithmetic):
+    """Neither without a limit nor within one that is not reached."""
+    plain = limited(0.0, np.inf, arithmetic).run()
+    assert abs(plain.torque).max() < 40.0
+    for limit in (np.inf, 40.0):
+        with_it = limited(0.5, limit, arithmetic).run()
+        assert with_it.torque.tobytes() == plain.torque.tobytes()
+        assert with_it.at_samples.tip_displacement.tobytes() == plain.at_samples.tip_displacement.tobytes()
+
+
+def textbook(Tt, limit):
+    """P, I and D apart, each by Tustin's rule; the integral gets T/Tt of the part of u that the limit takes."""
+    state = {"I": 0.0, "D": 0.0, "e": 0.0}
+
+    def controller(m):
+        e = m.angle_reference - m.hub_angle
+        lag = 2 / (POLE * T)
+        state["D"] = ((lag - 1) * state["D"] + KD * 2 / T * (e - state["e"])) / (lag + 1)
+        u = m.feedforward + KP * e + state["I"] + KI * T / 2 * e + state["D"]
+        state["I"] += KI * T * e + T / Tt * (np.clip(u, -limit, limit) - u)
+        state["e"] = e
+        return u
+
+    return controller
+
+
+def test_anti_windup_is_the_back_calculation_of_a_textbook_and_overshoots_less():
+    limit = 1.0
+    wound, unwound = limited(0.0, limit).run(), limited(0.3, limit).run()
+    assert_close(unwound, limited(0.0, limit).controller(textbook(0.3, limit)))
+    assert unwound.saturated["torque"] > 20
+    end = unwound.scenario.hub_angle[-1]
+    over = [each.at_samples.hub_angle.max() - end for each in (wound, unwound)]
+    assert over[1] < 0.5 * over[0]

@@ -21,7 +21,7 @@ from tfarm.arm import HubFeedback
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import STAGES
 from tfarm.case import Case
-from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, Slew, kernel, scenario
+from tfarm.dsp import Actuator, Chain, Converters, ReferenceShaping, Sampling, Simulator, Slew, kernel, scenario
 from tfarm.dsp.kernel import AMPLIFIER, DAC, ENCODER
 from tfarm.dsp.simulate import quantisers
 from tfarm.exported import controller, fmu, live_loop, tuner_code
@@ -37,6 +37,7 @@ ARM, LAW, MODES = tfarm.load("sasaki2012-lab"), tfarm.HubFeedback(K1=0.3, K2=0.3
 EQUAL, TIE = 1e-12, 1e-9  # of the largest value of a signal, and of a step
 TABLES = {  # of each stage; steps need a range
     "reference": {"slew": {"travel": 0.7, "rise_time": 0.3, "reading": "total"}},
+    "shaper": {"reference": {"profile": "s-curve", "shaper": "ZV", "modes": 1}},
     "anti-alias filter": {"sampling": {"antialias_corner": 300.0}},
     "encoder": {"converters": {"encoder_counts": 500}},
     "hub rate": {"converters": {"hub_rate": "difference", "rate_filter": 100.0}},
@@ -53,7 +54,13 @@ TABLES = {  # of each stage; steps need a range
     "plant": {},
     "volts": {"actuator": {"motor_constant": 0.5}},
 }
-KINDS = {"sampling": Sampling, "converters": Converters, "actuator": Actuator, "slew": Slew}
+KINDS = {
+    "sampling": Sampling,
+    "converters": Converters,
+    "actuator": Actuator,
+    "slew": Slew,
+    "reference": ReferenceShaping,
+}
 
 
 def vectors(consumer, every=1):
@@ -74,7 +81,7 @@ def chain_of(stages):
 def vector(chain, count=MODES):
     """The simulation of a slew of a chain with noise on its references, none of its values next to a tie."""
     rng = np.random.default_rng(1)
-    task = scenario("slew", ARM, chain, 3.0 * chain.slew.rise_time)
+    task = scenario("slew", ARM, chain, 3.0 * chain.slew.rise_time, LAW)
     sizes = {"feedforward": 3.0, "hub_angle": 0.1, "hub_rate": 1.0, "rigid_moment": 1.0}
     noise = {name: getattr(task, name) + size * rng.normal(size=task.t.size) for name, size in sizes.items()}
     truth = Simulator(Case(ARM, LAW, chain), replace(task, **noise), count=count).run()

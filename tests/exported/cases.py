@@ -37,6 +37,7 @@ CASES = {  # arm, law, chain
     "integral": (LAB, PI, IDEAL),
     "notch": (LAB, NOTCH, replace(REAL, converters=replace(REAL.converters, hub_rate="ideal"))),
     "estimate": (LAB, GAINS, REAL),
+    "windup": (LAB, replace(PI, anti_windup=0.5), replace(IDEAL, actuator=Actuator(torque_limit=0.5))),
 }
 
 

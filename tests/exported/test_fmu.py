@@ -83,7 +83,7 @@ def assert_equal(found, truth, name=""):
     np.testing.assert_allclose(found, truth, rtol=0, atol=EQUAL * abs(truth).max(), err_msg=name)
 
 
-@pytest.mark.parametrize("case", ["single", "impulse", "pulse", *thinned(["reference", "rig"], 2)])
+@pytest.mark.parametrize("case", ["single", "impulse", "pulse", "windup", *thinned(["reference", "rig"], 2)])
 def test_a_loop_is_that_of_the_simulation(case):
     """Laws with states and of another input, references, an impulse and a disturbance; `tests.dsp.test_stages` has
     gains under every stage of a chain."""

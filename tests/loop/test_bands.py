@@ -12,9 +12,10 @@ from tests.shared import circle_crossings
 from tfarm.arm import FED_BACK, HubFeedback, Law
 from tfarm.case import Case
 from tfarm.dsp import Chain, Converters, Sampling
-from tfarm.loop.circle import Arcs, Circle, Discs, complete_band, filter_bound, root_ratio
+from tfarm.loop.circle import Arcs, Circle, Discs, complete_band, root_ratio
 from tfarm.loop.circle_crossings import FACTOR
 from tfarm.loop.edges import delay_limit, whole_loop
+from tfarm.loop.left_poles import filter_bound
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.reduced import modal_model

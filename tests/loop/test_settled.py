@@ -14,9 +14,10 @@ from tests.survey import each_of, tally
 from tfarm.arm import FED_BACK, Arm, Hub, HubFeedback, Link, Section
 from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling
-from tfarm.loop.circle import Circle, bound_left_of, complete_band
+from tfarm.loop.circle import Circle, complete_band
 from tfarm.loop.circle_crossings import stable_windows
 from tfarm.loop.edges import shown_windows, whole_loop
+from tfarm.loop.left_poles import bound_left_of
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.spectrum import modes

@@ -7,7 +7,6 @@ import pytest
 
 import tfarm
 from tfarm.arm import HubFeedback
-from tfarm.synthesis.stability_map import sampled_region
 from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.exported.live_loop import live_data
@@ -15,6 +14,7 @@ from tfarm.loop.plane import moment_axis
 from tfarm.loop.plane_axes import rate_axis, rate_columns
 from tfarm.loop.stability import stability
 from tfarm.report.blocks import prose
+from tfarm.synthesis.stability_map import sampled_region
 
 LAB = tfarm.load("sasaki2012-lab")
 FRICTION = 0.02

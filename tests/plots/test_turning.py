@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import tfarm
-from tfarm.synthesis.stability_map import sampled_region
 from tfarm.case import Case
 from tfarm.crossing import pieces
 from tfarm.dsp import load_chain
@@ -17,6 +16,7 @@ from tfarm.loop.sampled_modes import sampled_loci
 from tfarm.plots import locus as locus_plot
 from tfarm.plots.roots import draw_sampled_loci
 from tfarm.spectrum.gains import default_gains, rate_unit
+from tfarm.synthesis.stability_map import sampled_region
 
 LAB, STOCKY = tfarm.load("sasaki2012-lab"), tfarm.load("stocky-steel")
 MOST = 5.0  # degrees from one piece of a line to the next

@@ -4,7 +4,6 @@ import sys
 from pathlib import Path
 
 import tfarm
-from tfarm.synthesis.stability_map import stable_regions
 from tfarm.case import Case
 from tfarm.digits import plain
 from tfarm.dsp import load_chain
@@ -15,6 +14,7 @@ from tfarm.plots.motion import modes
 from tfarm.plots.regions import gain_regions
 from tfarm.response.frequency import bode, resonant_band
 from tfarm.spectrum.gains import default_gains
+from tfarm.synthesis.stability_map import stable_regions
 
 PICTURES = Path(__file__).parents[2] / "reports" / "pictures"
 DOTS = 100  # an inch: pictures of a README are shown at their own size

@@ -14,7 +14,6 @@ import tfarm
 from tests.report.written import blocks_of, values_of
 from tfarm.arm import HubFeedback
 from tfarm.arm.chain import Converters, Sampling
-from tfarm.synthesis.stability_map import CUT_RANGE, K2_RANGE, stable_regions
 from tfarm.case import Case
 from tfarm.digits import kept_digits
 from tfarm.dsp import Chain, Simulator, scenario
@@ -28,6 +27,7 @@ from tfarm.report.page import FILM_FRAMES, ArmReport, GivenLaw
 from tfarm.report.sampled_section import sampled_section, slews
 from tfarm.schema import text
 from tfarm.spectrum.gains import default_gains
+from tfarm.synthesis.stability_map import CUT_RANGE, K2_RANGE, stable_regions
 
 LAB, PAPER = tfarm.load("sasaki2012-lab"), tfarm.load("sasaki2012")
 GAINS = HubFeedback(K1=0.3, K2=0.3)

@@ -29,7 +29,7 @@ def excess(rng, structures=tuple(STRUCTURES)):
     if not arm.damping:
         arm = replace(arm, link=replace(arm.link, damping=2 * log(rng, 1e-3, 2e-2) / first))
     structure = str(rng.choice(structures))
-    law = design(arm, structure=structure, chain=chain, modes=1).law
+    law = design(arm, "damping", structure=structure, chain=chain, modes=1).law
     other = HeldLoop(arm, chain.sampling.period, 20)
     radii = [other.radius(law.times(share)) for share in (1 / RESERVE, 1.0, RESERVE)]
     return max(radii[0], radii[2]) - 1 - EDGE, radii[1] - 1, f"{arm.name}, {structure}"

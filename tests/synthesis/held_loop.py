@@ -15,10 +15,12 @@ ROWS = ("hub_angle", "hub_rate", "root_moment")
 
 
 def blocks(law, T):
-    """(row, numerator, denominator in z) of each signal of a law, by SciPy's bilinear rule."""
+    """(row, numerator, denominator in z) of each signal of a law, by SciPy's bilinear rule, with time in periods."""
     for part in law.parts:
-        system = part.block.num, part.block.den
-        num, den, _ = cont2discrete(system, T, "bilinear") if part.block.order else (*system, T)
+        system = [
+            np.array(each) * T ** -np.arange(len(each) - 1.0, -1.0, -1.0) for each in (part.block.num, part.block.den)
+        ]
+        num, den, _ = cont2discrete(system, 1.0, "bilinear") if part.block.order else (*system, T)
         yield ROWS.index(part.signals[0]), np.atleast_1d(np.squeeze(num)), np.atleast_1d(den)
 
 

@@ -43,7 +43,7 @@ HELD = HeldLoop(LAB, 0.01)
 @pytest.mark.parametrize("name", thinned(tfarm.presets(), 8))
 def test_what_is_recommended_holds_when_sampled(name):
     """By the whole verdict, at the gains and a quarter to either side, and in continuous time."""
-    found = design(tfarm.load(name), chain=tfarm.dsp.load_chain(name))
+    found = design(tfarm.load(name), "damping", chain=tfarm.dsp.load_chain(name))
     laws = [found.law.times(share) for share in (1 / RESERVE, 1.0, RESERVE)]
     assert all(sampled_verdict(Case(tfarm.load(name), law, found.chain)).is_stable for law in laws)
     assert found.sampled.is_stable
@@ -112,7 +112,7 @@ def test_the_residual_moment_scales_with_the_mass_of_a_similar_arm():
 def test_gains_for_a_random_rig_hold_on_another_model_and_nothing_is_recommended_where_nothing_holds():
     late = Chain(sampling=Sampling(delay_samples=3.0))
     with pytest.raises(ConvergenceError, match="widen the bounds"):
-        design(replace(LAB, name="late"), K1=(30.0, 60.0), K2=(-3.0, -2.0), chain=late)
+        design(replace(LAB, name="late"), "damping", K1=(30.0, 60.0), K2=(-3.0, -2.0), chain=late)
     over, own, _ = excess(np.random.default_rng([1, 0]), (TWO_GAINS,))
     assert over <= 0
     assert own < 0
@@ -121,8 +121,8 @@ def test_gains_for_a_random_rig_hold_on_another_model_and_nothing_is_recommended
 DATA = Path(__file__).parents[1] / "data" / "reproductions"
 ARMS = {name: tfarm.load(DATA / f"{name}.toml") for name in ("r2", "r3", "r7")}
 BETTER = {  # coefficients after Kp, and the residual [N m] or the damping ratio
-    ("r2", "PD+notch", "residual"): ((9.422306, 200.0, 135.19767, 0.6302521, 2.4058711), 1.254325),
-    ("r3", "PD", "residual"): ((13.563,), 0.0642307),
+    ("r2", "PD+notch", "residual"): ((6329.0, 199.99, 84.06, 1.069, 690.17), 0.8652847),
+    ("r3", "PD", "residual"): ((13.36855438,), 0.06389279),
     ("r7", "K1-K2", "damping"): ((255.54, -17.616), 0.0268544),
 }
 AS_GOOD = 1e-3  # relative: so near to the better value a design has to come
@@ -130,7 +130,9 @@ AS_GOOD = 1e-3  # relative: so near to the better value a design has to come
 
 @pytest.mark.parametrize(("name", "structure", "objective"), thinned([*BETTER][::-1], 2))
 def test_a_design_is_at_least_as_good_as_a_known_stable_law(name, structure, objective):
-    """Designs left 1.48154 and 0.0943552 N m; 0.0239651 was where the first bounds of K2 ended."""
+    """The best of 16 evolution strategies of 77,000 laws, and of 20,001 values of K1; 0.0239651 was where the first
+    bounds of K2 ended.
+    """
     arm, (at, value) = ARMS[name], BETTER[name, structure, objective]
     form = structure_of(structure, arm, Kp=0.0, modes=2, period=Chain().sampling.period, bounds={})
     law = form.record_at(form.at(at))

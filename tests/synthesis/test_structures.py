@@ -25,7 +25,7 @@ from tfarm.loop.stability import stability
 from tfarm.schema import text
 from tfarm.synthesis import judge, search
 from tfarm.synthesis.design import design
-from tfarm.synthesis.judge import LOST, RESERVE
+from tfarm.synthesis.judge import LOST, RESERVE, TOO_SLOW
 from tfarm.synthesis.models import in_blocks, squares
 from tfarm.synthesis.structures import STRUCTURES, structure_of
 from tfarm.tuner.trial import Cost, slew_trial
@@ -54,9 +54,11 @@ def start_of(name):
 
 @pytest.mark.parametrize("name", thinned([each for each in STRUCTURES if each != "PI"], 3))  # which needs friction
 def test_a_law_of_each_structure_is_judged_as_by_another_model(name):
-    """Margin, peak of S and, without the higher modes, the radius."""
+    """Margin, peak of S and, without the higher modes, the radius; of a stable law with smaller gains."""
     law = start_of(name)
-    if HELD.radius(law) >= 1:
+    for _ in range(3):
+        if HELD.radius(law) < 1:
+            break
         assert judge_of(LAB, law, "margin").score(law) >= 1e3
         law = law.times(0.3)
     assert HELD.radius(law) < 1
@@ -82,9 +84,13 @@ def test_a_delay_margin_beyond_the_longest_is_a_lower_bound_and_not_flat():
         assert text(judged.value(law)) == "≥ 1"
     by_damping = [judge_of(LAB, law, "damping").value(law) for law in (weak, strong)]
     assert by_damping[0] < by_damping[1]
-    assert judged.score(weak) / judged.score(strong) == pytest.approx(
-        (1 + by_damping[0]) / (1 + by_damping[1]), rel=1e-9
-    )
+    scores = []
+    for law in (weak, strong):
+        # without the condition of speed, which neither meets
+        entries = judged.entries(law)
+        scores.append(judged.objective.scores(judged, entries, judged.model.poles(entries))[0])
+        assert judged.score(law) > TOO_SLOW / 2
+    assert scores[0] / scores[1] == pytest.approx((1 + by_damping[0]) / (1 + by_damping[1]), rel=1e-9)
 
 
 def test_a_peak_of_the_loop_function_between_two_lines_limits_the_delay():
@@ -312,7 +318,7 @@ def test_positive_position_feedback_is_a_sum_of_filters():
 
 @pytest.fixture(scope="module")
 def pid():
-    return {continuous: design(LAB, structure="PID", continuous=continuous) for continuous in (False, True)}
+    return {continuous: design(LAB, "damping", structure="PID", continuous=continuous) for continuous in (False, True)}
 
 
 def controller(c):
@@ -343,8 +349,10 @@ def test_a_sampled_pid_is_stable_with_a_reserve_by_another_model_and_as_good_as_
     assert np.log(HELD.radius(law)) == pytest.approx(np.log(pid[False].sampled.spectral_radius), rel=1e-4)
     assert pid[False].at_limit == ("Ki",)
     assert c["Ki"] == pytest.approx(0.1 * c["Kp"] * np.sqrt(c["Kp"] / LAB.total_inertia), rel=1e-9)
-    assert pid[True].value >= design(LAB, structure="PD", continuous=True).value
-    assert pid[False].value >= 0.97 * design(LAB, structure="lead").value  # PD with a filter, of the angle too
+    assert pid[True].value >= design(LAB, "damping", structure="PD", continuous=True).value
+    assert (
+        pid[False].value >= 0.97 * design(LAB, "damping", structure="lead").value
+    )  # PD with a filter, of the angle too
 
 
 def test_a_constant_torque_leaves_no_error_of_the_hub_angle(pid):
@@ -365,7 +373,7 @@ def test_pi_needs_friction(monkeypatch):
     """The roots of J s^3 + b s^2 + Kp s + Ki of a rigid arm are stable where b Kp > J Ki; without b never."""
     monkeypatch.setattr(search, "MOST_RUNS", 1)
     with pytest.raises(ConvergenceError, match="no law PI"):
-        design(LAB, structure="PI")
+        design(LAB, "damping", structure="PI")
     form = structure_of("PI", LAB, Kp=0.0, modes=2, period=T, bounds={})
     Kp, Ki = form.fixed["Kp"], 3 * form.free[0].bounds[0]
     for share, is_stable in ((1.1, True), (0.9, False)):
@@ -383,5 +391,5 @@ def test_a_pinned_tip_has_laws_of_all_structures_and_a_locked_hub_none():
         assert np.isfinite([form.origin, *form.box]).all()
         assert 0.0 < form.fixed["Kp"] < np.inf
         with pytest.raises(ParameterError, match="locked hub"):
-            design(locked, structure=name)
-    assert design(pinned, structure="PD").verdict.is_stable
+            design(locked, "damping", structure=name)
+    assert design(pinned, "damping", structure="PD").verdict.is_stable

@@ -25,7 +25,7 @@ def found():
     """With a few arms tried inside: the test asks at seven of them itself."""
     with pytest.MonkeyPatch.context() as fewer:
         fewer.setattr(worst_case, "ARMS_TRIED", 6)
-        return design(LAB, K1=(0.1, 30.0), K2=(-0.6, 0.95), also=[SHORT], ranges={"payload.mass": MASSES})
+        return design(LAB, "damping", K1=(0.1, 30.0), K2=(-0.6, 0.95), also=[SHORT], ranges={"payload.mass": MASSES})
 
 
 def test_a_further_search_is_given_what_the_one_before_found():
@@ -63,7 +63,7 @@ def test_every_arm_is_held_and_damped_as_by_another_model(found):
 @pytest.mark.survey
 def test_no_other_gains_serve_all_arms_better(found):
     """Nor those that are best for one of them."""
-    alone = design(LAB, K1=(0.1, 30.0), K2=(-0.6, 0.95)).law
+    alone = design(LAB, "damping", K1=(0.1, 30.0), K2=(-0.6, 0.95)).law
     models = [HeldLoop(arm, T) for arm in (LAB, SHORT, *(LAB.having(payload_mass=mass) for mass in MASSES))]
     rng = np.random.default_rng(4)
     K1, K2 = found.law.K1 * rng.uniform(0.8, 1.2, 30), found.law.K2 + rng.uniform(-0.1, 0.1, 30)

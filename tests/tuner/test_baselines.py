@@ -26,7 +26,7 @@ from tfarm.tuner import (
     slew_trial,
     zero_vibration,
 )
-from tfarm.tuner.baselines import quantised_chain, shape_scenario, shaper, tried_loops
+from tfarm.tuner.baselines import quantised_chain, shaper, tried_loops
 from tfarm.tuner.tuning import usual_plan
 
 GAINS = tfarm.HubFeedback(K1=0.3, K2=1.0)
@@ -100,7 +100,7 @@ def test_extra_insensitive_tolerates_a_share_at_the_mode():
 def test_a_one_mode_arm_is_left_at_rest():
     """No damping, no feedback, one mode: after the shaped slew nothing vibrates, to the last digits."""
     trial = slew_trial(tfarm.load("sasaki2012"), K1=0.0, count=1)
-    task = shape_scenario(trial.task, shaper(trial.loop, "ZV", 1))
+    task = trial.task.through(shaper(trial.loop, "ZV", 1))
     quiet = replace(trial, task=task).with_constant(0.0)
     before = residual_rms(trial.with_constant(0.0), trial.task)
     after = quiet.x[quiet.t > task.busy_until + 0.011]

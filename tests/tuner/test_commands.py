@@ -47,16 +47,14 @@ def test_tune_lab(capsys, tmp_path):
 
 
 def lateness(arm, period):
-    """Half a damped period of either mode of the exact loop in whole samples and one more; EI has two a mode."""
+    """Half a damped period of either mode of the exact loop in whole samples and one more; of EI a whole one."""
     poles = tfarm.closed_loop_poles(arm, tfarm.HubFeedback(K1=0.3), 4).values
     first, second = sorted(pole.imag for pole in poles if pole.imag > 0)[:2]
-    width = math.acos(0.95 / 1.05) / math.pi
 
-    def samples(*frequencies):
-        return sum(math.floor(math.pi / (omega * period)) + 1 for omega in frequencies)
+    def samples(halves):
+        return sum(math.floor(halves * math.pi / (omega * period)) + 1 for omega in (first, second))
 
-    apart = [omega * factor for omega in (first, second) for factor in (1 - width, 1 + width)]
-    return {"ZV": period * samples(first, second), "EI": period * samples(*apart)}
+    return {"ZV": period * samples(1), "EI": period * samples(2)}
 
 
 def test_without_a_guard_the_upper_end_is_inf_and_a_divergence_is_reported(capsys):

@@ -1,12 +1,13 @@
-"""Signal chain between the controller and the arm: sampling, converters, actuator, and the reference slew.
+"""Signal chain between the controller and the arm: sampling, converters, actuator, and the reference of a slew.
 
 By default everything is ideal.  Frozen records, checked once, SI units.
 """
 
 import math
+import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass, field, fields, replace
+from typing import Annotated, Any, Literal, get_args
 
 from tfarm.arm import schema
 from tfarm.arm.checks import (
@@ -27,6 +28,8 @@ from tfarm.errors import ParameterError, must_be_known, name_file, require, unkn
 from tfarm.schema import Quantity
 
 MomentReading = Literal["vibration", "total"]
+Profile = Literal["bang-bang", "s-curve", "polynomial", "file"]
+ShaperName = Literal["none", "ZV", "ZVD", "EI"]
 # samples: each whole one is a state more
 MOST_DELAY = 100.0
 # of a time: by so little before a sample it is at it, as its quotient with the period is rounded
@@ -195,8 +198,31 @@ class Slew:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ReferenceShaping:
+    """The reference of a slew: the `profile` of its motion, and the `shaper` for the first `modes` of the loop.
+
+    A profile "file" is read from the CSV `file`, time [s] and angle or travel in any unit: it is scaled to `Slew`.
+    """
+
+    profile: Profile = "bang-bang"
+    shaper: ShaperName = "none"
+    modes: int = 2
+    file: str | None = None
+
+    def __post_init__(self) -> None:
+        must_be_known("reference.profile", self.profile, get_args(Profile))
+        must_be_known("reference.shaper", self.shaper, get_args(ShaperName))
+        # each mode more is half a period of it more
+        whole("reference.modes", self.modes, 1, 10, "a whole number of flexible modes to shape for, 1 to 10")
+        remedy = 'the path of a CSV file of time and angle, with profile = "file"; leave it out otherwise'
+        is_named = isinstance(self.file, str) and bool(self.file.strip())
+        is_right = is_named if self.profile == "file" else self.file is None
+        require(is_right, "reference.file", self.file, remedy)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Chain:
-    """The whole chain: `[sampling]`, `[converters]`, `[actuator]` and `[slew]` of a file.
+    """The whole chain: `[sampling]`, `[converters]`, `[actuator]`, `[slew]` and `[reference]` of a file.
 
     `period_from` is the origin of its sampling period in words, "the file's period"; "" where none was stated.
     """
@@ -205,6 +231,7 @@ class Chain:
     converters: Converters = field(default_factory=Converters)
     actuator: Actuator = field(default_factory=Actuator)
     slew: Slew = field(default_factory=Slew)
+    reference: ReferenceShaping = field(default_factory=ReferenceShaping)
     period_from: str = field(default="", compare=False, repr=False)
 
     @property
@@ -231,18 +258,31 @@ def _whole(key: str, value: object, least: int, most: int, unit: str) -> None:
 
 
 CHAIN_TABLES: dict[str, type[TomlTable]] = {
-    kind.__name__.lower(): schema.of(kind)(TomlTable) for kind in (Sampling, Converters, Actuator, Slew)
+    name: schema.of(kind)(TomlTable)
+    for name, kind in {
+        "sampling": Sampling,
+        "converters": Converters,
+        "actuator": Actuator,
+        "slew": Slew,
+        "reference": ReferenceShaping,
+    }.items()
 }
 
 
 def load_chain(name_or_path: AnyFile) -> Chain:
     """Read the chain of an arm's file (or preset, or a file of its own); ideal without these tables.
 
+    A file of a profile is found from the folder of that file.
+
     Raises ParameterError for an unknown key, a wrong type or an invalid value.
     """
     tables, file = load_tables(name_or_path)
     with name_file(file):
-        return chain_of_tables(tables)
+        chain = chain_of_tables(tables)
+    if chain.reference.file is None:
+        return chain
+    profile = os.path.join(os.path.dirname(file), chain.reference.file)
+    return replace(chain, reference=replace(chain.reference, file=profile))
 
 
 def chain_of_tables(tables: Mapping[str, Any]) -> Chain:
@@ -269,7 +309,7 @@ def stated_keys(chain: Chain) -> dict[str, dict[str, Any]]:
 
 
 def file_text(arm: Arm, chain: Chain | None = None) -> str:
-    """Return the arm's TOML file with each key of [sampling], [converters], [actuator] and [slew] that is no default.
+    """Return the arm's TOML file with each key of the tables of a chain that is no default.
 
     Python's shortest exact digits are TOML's too, and so is inf; a text needs its quotes.
     """

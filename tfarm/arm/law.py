@@ -52,6 +52,7 @@ class Law:
     `delay` [s] is that of the controller.  `input` is the driven input, by default that of the arm.  With a `period`
     [s] the law is in z, without one in s.  Signals among `references` enter as (signal - reference).  `sign` is -1, or
     1 for v = +C y.  `rule` and `prewarp` [rad/s] are those of the discretisation of a continuous-time law.
+    `anti_windup` [s] is the time constant of back-calculation to the integrator at a limit of the input, 0 for none.
     Raises ParameterError, naming the key, for illegal values.
     """
 
@@ -64,6 +65,7 @@ class Law:
     rule: str = "tustin"
     prewarp: Annotated[float, not_negative, "a frequency in rad/s, or 0"] = 0.0
     name: str = "law"
+    anti_windup: Annotated[float, not_negative, "a time constant in s, or 0"] = 0.0
     parts: tuple[Part, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
@@ -89,6 +91,9 @@ class Law:
         require(count <= most_signals, "signals", count, f"at most {most_signals} signals")
         for each in self.references:
             must_be_known("references", each, self.signals)
+        remedy = "back-calculation is to an integrator, a pole of the law at s = 0, and it has none"
+        is_integral = not self.anti_windup or self.is_discrete or self.has_integrator
+        require(is_integral, "anti_windup", self.anti_windup, remedy)
         remedy = "a discrete-time law is causal: give num at most the degree of den"
         require(self.period is None or not self.is_improper, "num", self.name, remedy)
 
@@ -209,6 +214,13 @@ class Law:
             else:
                 found[f"{name}.gain"] = place, 1.0
         return found
+
+    @property
+    def has_integrator(self) -> bool:
+        """Whether a law in s has a pole at 0."""
+        size = abs(self.poles)
+        # of the fastest pole, and of that of a law of a single integrator
+        return bool((size <= 1e-9 * max(1.0, size.max(initial=0.0))).any())
 
     # ------------------------------------------------------------ values
 

@@ -11,6 +11,12 @@
     gain = 3.0                  # with zeros = [...] and poles = [...] too
 
 or `matrices = "file.mat"` with A, B, C, D and `signals = [...]`, a name for each column of B.
+
+    [weights]                   # on S, K S and T, for `tfarm norm`
+    KS = 0.1
+    [weights.S]
+    num = [0.5, 2.0]            # of s; of z with a period
+    den = [1.0, 0.02]
 """
 
 from pathlib import Path
@@ -21,6 +27,7 @@ from pydantic import Field
 from tfarm.arm.law import Law
 from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arm.schema import StrictTable, validate_table
+from tfarm.arm.weights import Weights, weights_of
 from tfarm.errors import MISSING, ParameterError, close_to, list_within, must_be_known, name_file, require
 from tfarm.files import read_mat
 
@@ -36,6 +43,7 @@ class LawTable(StrictTable):
     references: list[str] = Field(default_factory=list)
     rule: str = "tustin"
     prewarp: float = 0.0
+    anti_windup: float = 0.0
     matrices: str | None = None
     system: str | None = None
     signals: list[str] | None = None
@@ -61,6 +69,37 @@ class SignalTable(StrictTable):
         require(self.den is None, f"{key}.num", MISSING, "den needs num")
         require(self.gain is not None, f"{key}.gain", MISSING, "give gain, or num and den")
         return {"zeros": self.zeros or (), "poles": self.poles or (), "gain": self.gain}
+
+
+class WeightTable(StrictTable):
+    """[weights]: a number or a table as of [law.SIGNAL] for each of S, KS and T."""
+
+    period: float | None = None
+    S: float | dict[str, Any] | None = None
+    KS: float | dict[str, Any] | None = None
+    T: float | dict[str, Any] | None = None
+
+
+def load_weights(name_or_path: AnyFile) -> Weights | None:
+    """Return the weights of a file's [weights] table, None where it has none.
+
+    Raises ParameterError, naming the file, for an unknown key, a wrong type or an illegal value.
+    """
+    tables, file = load_tables(name_or_path)
+    if "weights" not in tables:
+        return None
+    with name_file(file):
+        head = validate_table(WeightTable, tables["weights"], "weights")
+        entries = {}
+        for name, value in head.model_dump(exclude={"period"}, exclude_none=True).items():
+            if isinstance(value, dict):
+                key = f"weights.{name}"
+                block = validate_table(SignalTable, value, key)
+                require(block.x is None, f"{key}.x", block.x, "a weight has no place; leave it out")
+                entries[name] = block.build(key)
+            else:
+                entries[name] = value
+        return weights_of(entries, head.period)
 
 
 def load_law(name_or_path: AnyFile) -> Law | None:

@@ -192,7 +192,7 @@ PART_TABLES: dict[str, type[TomlTable]] = {
 def arm_of_table(table: dict[str, Any]) -> Arm:
     """Return the arm of a parsed TOML table.  Raises ParameterError for the first problem."""
     # of the loop: read by other rooms
-    loop_tables = ("sampling", "converters", "actuator", "slew", "law", "requirements")
+    loop_tables = ("sampling", "converters", "actuator", "slew", "law", "weights", "requirements")
     of_arm = {key: value for key, value in table.items() if key not in loop_tables}
     head = validate_table(ArmTable, of_arm, "")
     own = head.model_dump(exclude_unset=True)

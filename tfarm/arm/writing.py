@@ -87,7 +87,7 @@ def law_toml(law: Law) -> str:
 
 def law_head(law: Law) -> dict[str, Any]:
     """Return the keys of [law] but its signals: the name, and what is not at its default."""
-    keys = ("input", "delay", "period", "sign", "references", "rule", "prewarp")
+    keys = ("input", "delay", "period", "sign", "references", "rule", "prewarp", "anti_windup")
     head = {key: getattr(law, key) for key in keys if getattr(law, key) != getattr(Law, key)}
     return {"name": law.name, **head}
 

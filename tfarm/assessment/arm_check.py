@@ -30,6 +30,7 @@ DEFAULTS = {
     "converters": "ideal, without quantisation and range",
     "actuator": "no limit of the input, no analog damping of the hub",
     "slew": f"1.15 times the reach at the tip, in {Chain().slew.rise_time:g} s",
+    "reference": "bang-bang, without input shaping",
     "law": "default gains: K1 = 0.00642 J w1, and K2 = 0.3 with hub inertia; scaled from the paper's, not a design",
 }
 

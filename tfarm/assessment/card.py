@@ -249,7 +249,7 @@ def result_card(
     _, undamped = graded_arm(case.arm)
     notes = [undamped] if undamped else []
     if case.gains == default_gains(case.arm):
-        advice = "`tfarm design` recommends gains"
+        advice = "`tfarm design` finds gains that are good"
         if undamped:
             advice = "without damping of the link no design is robust"
         notes.insert(0, f"default gains: scaled from the paper's, not a design; {advice}")

@@ -18,7 +18,7 @@ from typing import Annotated
 import numpy as np
 
 from tfarm.arm import AT_HUB, AnyLaw, Arm, Law
-from tfarm.arm.chain import PERIOD
+from tfarm.arm.chain import PERIOD, ReferenceShaping
 from tfarm.arm.checks import number
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
@@ -27,6 +27,7 @@ from tfarm.assessment.card import loops_by_name
 from tfarm.assessment.signal_figures import LoopRecord, LoopResponse, SignalCurve, signal_unit
 from tfarm.case import Case
 from tfarm.dsp import Chain, traces
+from tfarm.dsp.profiles import ACCELERATION_STEPS, JERK_STEPS
 from tfarm.dsp.results import simulate_modes
 from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, describe_scenario, rest_scenario, scenario
 from tfarm.dsp.sensed import sensed_plant
@@ -57,6 +58,7 @@ CONSUMER = Consumer(
     "step",
     acts=(
         "reference",
+        "shaper",
         "anti-alias filter",
         "encoder",
         "hub rate",
@@ -75,14 +77,18 @@ CONSUMER = Consumer(
     none=("volts",),
 )
 
+# order of the derivative of the angle that has steps, shares of the rise time where it has them, and their sizes
+STEPS_OF_PROFILE = {"bang-bang": (2, *ACCELERATION_STEPS), "s-curve": (3, *JERK_STEPS)}
+
 
 @frozen(kw_only=True)
 class Step(LoopRecord):
     """Time responses of an arm under a controller, continuous-time and sampled, at the times `t` [s].
 
-    A law in z has no continuous-time loop; the signals of a sampled loop end where it was stopped.  `names` are the
-    signals of hub and tip, root moment and torque, `reference` is that of hub and tip, `response` the continuous-time
-    response at any time, `busy_until` [s] the end of the input.
+    A law in z has no continuous-time loop, and a slew through a shaper, or of a polynomial or a file, no response of
+    it; the signals of a sampled loop end where it was stopped.  `names` are the signals of hub and tip, root moment and
+    torque, `reference` is that of hub and tip, `response` the continuous-time response at any time, `busy_until` [s]
+    the end of the input.
     """
 
     controller: Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]
@@ -90,7 +96,10 @@ class Step(LoopRecord):
     scenario_in_words: Annotated[str, Quantity("scenario", help="input with its size")]
     duration: Annotated[float, Quantity("duration", "s", 4, help="length of the record")]
     period: Annotated[float, PERIOD]
-    continuous: Annotated[LoopResponse | None, Quantity(help="continuous-time loop; null under a law in z")]
+    continuous: Annotated[
+        LoopResponse | None,
+        Quantity(help="continuous-time loop; null under a law in z and of a slew without steps"),
+    ]
     sampled: Annotated[LoopResponse, Quantity(help="sampled loop")]
     response: TimeResponse | None
 
@@ -192,7 +201,7 @@ def step(
     if is_step:
         task = rest_scenario("reference", arm, chain, length, hub)
     else:
-        task = scenario(scenarios[scenario_name], arm, chain, length)
+        task = scenario(scenarios[scenario_name], arm, chain, length, case.law)
     require(task.t.size > 1, "duration", length, f"at least one sampling period, {task.period:g} s")
     tip = "tip_displacement" if hub == AT_HUB[0] else f"velocity@{arm.length!r}"
     names = tuple(dict.fromkeys((hub, tip, root_moment, *outputs)))
@@ -201,7 +210,7 @@ def step(
             sensed_plant(arm, Chain(), ("tip_displacement",), 1).unfiltered, task.tip_offset, scenario_name
         )
     response = None
-    if poles is not None:
+    if poles is not None and (task.name != "slew" or has_steps(chain.reference)):
         response = time_response(poles, names, excitation(poles.loop, case, task, names), length)
     t = _times(response, task)
     reference = _references(task, t, hub, tip, arm.reach)
@@ -221,6 +230,11 @@ def step(
         sampled=sampled,
         continuous=continuous,
     )
+
+
+def has_steps(reference: ReferenceShaping) -> bool:
+    """Return whether a slew is few steps of a derivative, which the continuous-time loop is solved for."""
+    return reference.profile in STEPS_OF_PROFILE and reference.shaper == "none"
 
 
 def _references(task: Scenario, t: Real, hub: str, tip: str, reach: float) -> dict[str, Real]:
@@ -317,15 +331,21 @@ def excitation(loop: ContinuousLoop, case: Case, task: Scenario, names: Sequence
     if task.name == "reference":
         hub = angle if task.hub_angle[0] else rate
         return Excitation(_inputs(law, {hub: lambda s: 1 / s}))
-    a = case.chain.slew.acceleration(arm.reach)
+    # of the acceleration in steps, or of the jerk
+    order, shares, sizes = STEPS_OF_PROFILE[case.chain.reference.profile]
     read = arm.gauged_inertia * float(task.reading == "vibration")
     references: dict[str, Transform] = {
-        angle: lambda s: 1 / s**3,
-        rate: lambda s: 1 / s**2,
-        moment: lambda s: -read / s,
+        angle: lambda s: 1 / s ** (order + 1),
+        rate: lambda s: 1 / s**order,
+        moment: lambda s: -read / s ** (order - 1),
     }
-    inputs = {**_inputs(law, references), ACTUATOR: lambda s: arm.turned_inertia / s + arm.rate_loss / s**2}
-    return Excitation(inputs, (0.0, rise / 2, rise), (a, -2 * a, a))
+    feedforward = {
+        ACTUATOR: lambda s: arm.turned_inertia / s ** (order - 1) + arm.rate_loss / s**order,
+    }
+    turn = case.chain.slew.travel_of(arm.reach) / arm.reach
+    weights = (size * turn / rise**order for size in sizes)
+    times = (share * rise for share in shares)
+    return Excitation({**_inputs(law, references), **feedforward}, tuple(times), tuple(weights))
 
 
 def _inputs(law: Law, references: Mapping[str, Transform]) -> dict[str, Transform]:

@@ -1,6 +1,7 @@
 """The commands on the continuous-time loop and on the sampled one."""
 
 import re
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,7 +25,9 @@ from tfarm.cli.options import (
     load_driven_loop,
     load_loop,
     name_and,
+    numbers,
     refuse,
+    without_none,
 )
 from tfarm.cli.output import emit, emit_loop, emit_record, has_options
 from tfarm.cli.progress import print_line
@@ -239,6 +242,40 @@ def sampled(
     show(found, defaults, summary=case.card(at_samples=found))
 
 
+def weight_entry(text: str) -> tuple[Any, ...]:
+    """Return numerator and denominator of NUM/DEN, coefficients in descending powers of s; of NUM over 1."""
+    num, _, den = text.partition("/")
+    coefficients = numbers("coefficients NUM or NUM/DEN in descending powers of s, such as 0.5,2/1,0.02")
+    return coefficients(num), coefficients(den or "1")
+
+
+@command(epilog="norm sasaki2012-lab --K1 3 --K2 0.15 --weight S=0.5,2/1,0.02 --weight KS=0.1")
+def norm(
+    *,
+    arm: ArmName,
+    weight: Annotated[
+        list[Any] | None, typer.Option(parser=name_and(weight_entry), metavar="NAME=NUM/DEN")
+    ] = None,
+    loop: Any = load_loop,
+    chain: Any = chain_of_options,
+    show: Any = emit_record,
+) -> None:
+    """H-infinity norms of weighted S, K S and T, with upper bounds.
+
+    They are those of the sampled loop, and the bounds hold between frequencies too.  The weights are those of
+    [weights] in the controller's file, else in the arm's; without any S and T have the weight 1.
+
+    Options:
+    weight: weight on S, KS or T, coefficients in descending powers of s; may be repeated, and replaces those of a file
+    """
+    from tfarm.arm.law_tables import load_weights
+
+    law = loop.keywords["law"]
+    wanted: Any = dict(weight or ()) or (law and load_weights(law)) or load_weights(arm)
+    case, defaults = loop(arm)
+    show(case.through(chain(arm)).norm(weights=wanted), defaults)
+
+
 @command(epilog="step sasaki2012-lab --scenario slew --png slew.png")
 def step(
     *,
@@ -265,6 +302,37 @@ def step(
     case, defaults = loop(arm)
     case = case.through(chain(arm))
     show(case.step(scenario, duration, outputs=output or (), settling_band=settling_band), defaults)
+
+
+@command(epilog="reference sasaki2012-lab --shaper ZVD --figure reference.png")
+def reference(
+    *,
+    arm: ArmName,
+    shaper: str | None = None,
+    profile: str | None = None,
+    modes: Annotated[int | None, typer.Option("--modes", min=1, max=10)] = None,
+    error: float = 0.3,
+    loop: Any = load_loop,
+    chain: Any = chain_of_options,
+    show: Any = emit,
+) -> None:
+    """Shaped reference of the slew: impulses, and residual vibration.
+
+    The residual is that of the sampled loop over an error of its frequencies.
+
+    Options:
+    shaper: none, ZV, ZVD or EI; by default that of [reference] in the file
+    profile: bang-bang, s-curve or polynomial; by default that of [reference]
+    modes: the first flexible modes, which are shaped for; by default those of [reference], or two
+    error: largest error of the frequencies, as a share
+    """
+    case, defaults = loop(arm)
+    own = chain(arm)
+    typed: Any = without_none({"shaper": shaper, "profile": profile, "modes": modes})
+    if profile is not None:
+        typed["file"] = None
+    case = case.through(replace(own, reference=replace(own.reference, **typed)))
+    show(case.reference(error=error), defaults)
 
 
 @command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")

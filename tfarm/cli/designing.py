@@ -66,6 +66,9 @@ def design(
     over: Annotated[
         list[Any] | None, typer.Option("--range", parser=name_and(interval), metavar="KEY=LO,HI")
     ] = None,
+    study: Annotated[Path | None, typer.Option("--study", metavar="FILE", exists=True)] = None,
+    posterior: Annotated[Path | None, typer.Option("--posterior", metavar="FILE", exists=True)] = None,
+    fresh: int = 64,
     trade_off: Annotated[bool, typer.Option("--trade-off")] = False,
     save: File = None,
     theory: TheoryName = None,
@@ -81,6 +84,9 @@ def design(
     objective: settling, time-constant, torque, Ms ...; without requirements: damping, margin, sensitivity, delay,
         residual or cost (of the tuner)
     require: requirements such as "GM>=6, PM>=45, Ms<=2, delay>=1, damping>=2%, torque<=5, settling<=1.5"
+    study: file of a study: requirements hold on the worst arms of a pool drawn from it
+    posterior: posterior of a fit, likewise
+    fresh: further arms drawn, on which the law is examined
     trade_off: the front of speed against robustness instead: 12 designs; --save writes each beside FILE
     continuous: for the continuous-time loop
     also: further arm; the objective is the worst of all; may be repeated
@@ -104,9 +110,8 @@ def design(
         ANGLE_GAIN: kp,
     }
     if trade_off:
-        refuse(
-            {"--range": over, "--continuous": continuous or None}, "the front is of given arms and both loops"
-        )
+        drawn = {"--range": over, "--study": study, "--posterior": posterior}
+        refuse(drawn | {"--continuous": continuous or None}, "the front is of given arms and both loops")
         front = tfarm.trade_off(subject, objective, **options)
         files = []
         for n, each in enumerate(front.laws, 1):
@@ -115,7 +120,16 @@ def design(
                 save_law(tfarm.Case(subject, each).law, files[-1])
         show(front, also=files)
         return
-    found = tfarm.design(subject, objective, continuous=continuous, ranges=dict(over or []), **options)
+    found = tfarm.design(
+        subject,
+        objective,
+        continuous=continuous,
+        ranges=dict(over or []),
+        study=study,
+        posterior=posterior,
+        fresh=fresh,
+        **options,
+    )
     if save is not None:
         save_law(tfarm.Case(subject, found.law).law, save)
     show(found, also=(save,))

@@ -277,7 +277,7 @@ def chain_of_options(
             "--dsp",
             metavar="FILE",
             rich_help_panel=SAMPLING,
-            help="TOML file with [sampling], [converters], [actuator], [slew]; by default that of the arm",
+            help="TOML file with [sampling], [converters], [actuator], [slew], [reference]; by default that of the arm",
         ),
     ] = None,
 ) -> "Chain":

@@ -4,6 +4,9 @@ discretise  a law in s made discrete, and the factors of a law in z
 plant       poles and residues of the modal plant, with analog filters
 pulse       the plant from sample to sample, under a zero-order hold
 sensed      the plant of each signal, and of all together
+profiles    the motion of a slew from rest to rest
+branches    poles along a number of a law, as branches
+shaping     impulses that vanish at poles of the loop
 scenarios   slew, step, decay, impulse and pulse
 stages      the door of every result on a sampled loop: stages that it does not have are refused
 kernel      compiled steps between the samples, and the linear law
@@ -13,7 +16,7 @@ results     a simulated scenario with enough modes, and its limit cycle
 traces      curves over time for pictures, and the motion for a film
 """
 
-from tfarm.arm.chain import Actuator, Chain, Converters, Sampling, Slew, load_chain
+from tfarm.arm.chain import Actuator, Chain, Converters, ReferenceShaping, Sampling, Slew, load_chain
 from tfarm.dsp.pulse import PulseTransfer, pulse_transfer
 from tfarm.dsp.scenarios import Scenario, scenario
 from tfarm.dsp.simulate import Measurement, Simulator
@@ -26,6 +29,7 @@ __all__ = [
     "Converters",
     "Measurement",
     "PulseTransfer",
+    "ReferenceShaping",
     "Sampling",
     "Scenario",
     "Simulation",

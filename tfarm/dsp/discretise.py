@@ -126,6 +126,30 @@ def system_matrix(law: Law) -> Real:
     return np.block([[A, B], [C, D]])
 
 
+def back_calculation(law: Law, limits: Any) -> Real:
+    """Return lowest and highest output, and the gains of back-calculation to each state of a law in z.
+
+    To the states x_{k+1} of `system_matrix` they add w (u within its limits - u), w being the direction of the
+    integrator, A w = w, with C w = T/Tt: so I_{k+1} of its output has T/Tt times that more.  There are no gains, and no
+    limits, where the law has no anti-windup or u no limit.  Raises ParameterError for several integrators.
+    """
+    low, high = limits
+    if not (law.anti_windup and math.isfinite(high - low)):
+        return np.array([-np.inf, np.inf])
+    assert law.period is not None
+    n = law.order
+    table = system_matrix(law)
+    *_, small = np.linalg.svd(table[:n, :n] - np.eye(n))
+    direction = small[-1]
+    through = float(table[n, :n] @ direction)
+    # of a pole from 1: more than the rounding of a law to float32
+    near = 1e-4
+    is_single = (abs(law.poles - 1.0) <= near).sum() == 1 and through != 0.0
+    remedy = "back-calculation is to one integrator, a pole at z = 1, that acts on the output"
+    require(is_single, "anti_windup", law.anti_windup, remedy)
+    return np.r_[low, high, law.period / law.anti_windup / through * direction]
+
+
 def acting_law(case: Case, law: Law | None = None) -> tuple[Law, Chain]:
     """Return the controller of a case in z in the numbers of its chain's arithmetic, and the chain with its delay.
 

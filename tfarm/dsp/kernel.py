@@ -21,6 +21,7 @@ CONSUMER = Consumer(
     "simulate",
     acts=(
         "reference",
+        "shaper",
         "anti-alias filter",
         "encoder",
         "hub rate",
@@ -289,13 +290,31 @@ def law_step(table: Any, z: Any, feedforward: float, single: bool, out: Any) -> 
         out[i] = add_row_product(table[i], z, feedforward if i == out.size - 1 else 0.0, single)
 
 
+@inlined
+def calculate_back(following: Any, back: Any, single: bool) -> None:
+    """Add w (u within its limits - u) to the next states, u being last; `back` is [lowest, highest, w]."""
+    u = following[following.size - 1]
+    excess = to_precision(min(max(u, back[0]), back[1]) - u, single)
+    if excess != 0.0:
+        for i in range(back.size - 2):
+            following[i] = to_precision(following[i] + to_precision(back[i + 2] * excess, single), single)
+
+
 @compiled
 def run_samples(
-    model: Any, state: Any, forcing: Any, electronics: Any, table: Any, sources: Any, references: Any
+    model: Any,
+    state: Any,
+    forcing: Any,
+    electronics: Any,
+    table: Any,
+    back: Any,
+    sources: Any,
+    references: Any,
 ) -> int:
     """Run a law over all samples; return their number before the root moment passes its bound.
 
-    [x_{k+1}; u - r] = table [x; e] of the errors e = reference - signal, `references` (n, columns).  `sources`
+    [x_{k+1}; u - r] = table [x; e] of the errors e = reference - signal, `references` (n, columns); `back` is that of
+    `back_calculation`.  `sources`
     (columns,) are the outputs of the columns, hub angle, hub rate and root moment through their converters, or -1 for a
     reference alone.
     """
@@ -322,6 +341,7 @@ def run_samples(
                 to_precision(references[k, j], single) - to_precision(value, single), single
             )
         law_step(table, z, to_precision(forcing.feedforward[k], single), single, following)
+        calculate_back(following, back, single)
         for i in range(order):
             z[i] = following[i]
         _advance_after(k, following[order], model, state, forcing, electronics)

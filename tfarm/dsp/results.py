@@ -370,7 +370,7 @@ def simulate(
 
 def simulate_for_picture(case: Case, scenario_name: str, duration: float) -> Simulation:
     """Simulate the same for a picture: 20 records a period of the fastest visible mode (`resolve_simulations`)."""
-    task = scenario(scenario_name, case.arm, case.chain, duration)
+    task = scenario(scenario_name, case.arm, case.chain, duration, case.law)
     ideal = case.through(ideal_chain(case.chain))
     used = enough_modes(lambda n: Simulator(ideal, task, count=n).run())
     return resolve_simulations(Simulator(case, task, count=used.modes), case.arm, Simulator.run)[0]
@@ -406,7 +406,7 @@ def simulated_run(
 
     Raises ParameterError as `simulate` does.
     """
-    task = scenario(name, case.arm, case.chain, duration)
+    task = scenario(name, case.arm, case.chain, duration, case.law)
     return Run(
         case,
         *simulate_modes(case, task, count, between, outputs),

@@ -2,16 +2,18 @@
 
 import math
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Annotated, Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tfarm.arm import AT_HUB, Arm, must_turn
+from tfarm.arm import AT_HUB, AnyLaw, Arm, must_turn
 from tfarm.arm.chain import PERIOD, TIME_ROUNDING, Chain, MomentReading
 from tfarm.arm.checks import positive
 from tfarm.arrays import Real
 from tfarm.dsp.plant import arm_under_chain
+from tfarm.dsp.profiles import motion_of_slew
+from tfarm.dsp.shaping import impulses_of
 from tfarm.errors import must_be_known, require
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -71,6 +73,14 @@ class Scenario:
         """Whether each sample (n,) is from the end of the slew on."""
         return self.t >= self.busy_until * (1 - TIME_ROUNDING)
 
+    def through(self, impulses: Real) -> Self:
+        """Return the scenario with every reference passed through impulses (m,); the slew ends later."""
+        names = ("feedforward", "hub_angle", "hub_rate", "rigid_moment")
+        late: dict[str, Any] = {
+            name: np.convolve(getattr(self, name), impulses)[: self.t.size] for name in names
+        }
+        return replace(self, busy_until=self.busy_until + (impulses.size - 1) * self.period, **late)
+
     def residual_rms(self, moment: Real) -> float | None:
         """Return the rms of the residual of a root moment (n,) [N m]; None of a record that ends before."""
         left = self.residual(moment) if moment.size == self.t.size else np.empty(0)
@@ -78,7 +88,7 @@ class Scenario:
 
 
 def slew_scenario(arm: Arm, chain: Chain, duration: float) -> Scenario:
-    """Return the bang-bang slew: hub acceleration +-4 travel/((r + L) rise^2), means over a sample, fed forward with J.
+    """Return the slew of a chain's profile, without its shaper: means over a sample, fed forward with J.
 
     On a rig also friction, back-EMF and analog damping at the mean rate, all in the unit of its input.
     The rigid arm's moment is -(J - I_h) theta_dd_ref of the interval before the sample.  Raises ParameterError for an
@@ -88,10 +98,9 @@ def slew_scenario(arm: Arm, chain: Chain, duration: float) -> Scenario:
     arm, chain = arm_under_chain(arm, chain)
     T = chain.sampling.period
     manoeuvre = chain.slew
-    t = T * np.arange(_samples(duration, T) + 1)
-    rate = manoeuvre.acceleration(arm.reach) * np.clip(np.minimum(t, manoeuvre.rise_time - t), 0.0, None)
+    t = np.float64(T) * np.arange(_samples(duration, T) + 1)
+    rate, mean = motion_of_slew(chain, arm.reach, t)
     acceleration = np.diff(rate) / T
-    mean = (rate[1:] + rate[:-1]) / 2
     return Scenario(
         name="slew",
         period=T,
@@ -149,8 +158,13 @@ def rest_scenario(name: str, arm: Arm, chain: Chain, duration: float, signal: st
 
 def describe_scenario(task: Scenario, arm: Arm, chain: Chain) -> str:
     """Return a scenario with its size, in words."""
+    if task.name == "slew":
+        reference = chain.reference
+        profile = f", {reference.profile}" * (reference.profile != "bang-bang")
+        shaper = f", {reference.shaper} shaper" * (reference.shaper != "none")
+        travel = chain.slew.travel_of(arm.reach)
+        return f"a slew: the tip moves {travel:.4g} m in {chain.slew.rise_time:g} s{profile}{shaper}"
     return {
-        "slew": f"a slew: the tip moves {chain.slew.travel_of(arm.reach):.4g} m in {chain.slew.rise_time:g} s",
         "step": f"a step of {task.feedforward[0]:.4g} {arm.input_unit}",
         "decay": f"the first mode released with the tip at {task.tip_offset:.4g} m",
         "impulse": f"an impulse of {task.impulse:.4g} {arm.input_unit} s on the hub",
@@ -159,12 +173,22 @@ def describe_scenario(task: Scenario, arm: Arm, chain: Chain) -> str:
     }[task.name]
 
 
-def scenario(name: str, arm: Arm, chain: Chain, duration: float) -> Scenario:
-    """Return the scenario of that name with its usual size.  Raises ParameterError for an unknown one."""
+def scenario(name: str, arm: Arm, chain: Chain, duration: float, law: AnyLaw | None = None) -> Scenario:
+    """Return the scenario of that name with its usual size; a slew through the shaper of the chain.
+
+    The impulses of a shaper are those for the arm under a `law`.  Raises ParameterError for an unknown scenario,
+    and for a shaper without a law.
+    """
     must_be_known("scenario", name, ("slew", "step", "decay", "impulse", "pulse"))
-    if name == "slew":
-        return slew_scenario(arm, chain, duration)
-    return rest_scenario(name, arm, chain, duration)
+    if name != "slew":
+        return rest_scenario(name, arm, chain, duration)
+    task = slew_scenario(arm, chain, duration)
+    shaper = chain.reference.shaper
+    if shaper == "none":
+        return task
+    remedy = "its impulses are those of a loop, and here is no law: leave it out"
+    require(law is not None, "reference.shaper", shaper, remedy)
+    return task.through(impulses_of(arm, chain, cast("AnyLaw", law)))
 
 
 def _samples(duration: float, period: float) -> int:

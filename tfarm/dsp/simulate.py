@@ -23,7 +23,7 @@ from tfarm.arm.law import REFERENCE, Law
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.case import Case
 from tfarm.dsp import kernel
-from tfarm.dsp.discretise import acting_law, system_matrix
+from tfarm.dsp.discretise import acting_law, back_calculation, system_matrix
 from tfarm.dsp.plant import RECORDED, USUAL_MODES, Plant, with_held_filter
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.sensed import sensed_plant
@@ -153,11 +153,12 @@ class Simulator:
         columns = (*law.signals, *law.wanted)
         kind = np.float32 if self.electronics.is_single else float
         table = system_matrix(law).astype(kind).astype(float)
+        back = back_calculation(law, self.electronics.quantisers[kernel.DAC, 1:]).astype(kind).astype(float)
         sources = np.array([self.measured.index(name) if name in self.measured else -1 for name in columns])
         references = references_of(law, self.scenario)
         state = self._start()
         done = kernel.run_samples(
-            self.model, state, self._forcing, self.electronics, table, sources, references
+            self.model, state, self._forcing, self.electronics, table, back, sources, references
         )
         return self._result(state, int(done), None if gains is None else np.full(state.torque.size, gains.K2))
 

@@ -6,6 +6,7 @@ Zeros and poles in z of a block are in delta = z - 1:
     matched  delta = e^{rT} - 1, with the same value at rest
     zoh      poles so; zeros of C(z): det(z - Phi + Gamma C) + (D - 1) det(z - Phi), in balls
     none     a block in z: roots of num(1 + delta) and den(1 + delta)
+    s        a block in s as it is, with the roots themselves
 
 Each has an error of some last bits of delta, also in a cluster, and one at z = 1 is 0.
 """
@@ -53,10 +54,11 @@ def block_factors(block: LawBlock, rule: str, T: float, c: float) -> tuple[Compl
     """Return the poles of a block in z, and the factor and the zeros of each of its signals, all as delta.
 
     `rule` is that of its discretisation with the period `T` [s], "none" of one in z; `c` [1/s] is Tustin's 2/T.
+    With the rule "s" they are the roots in s.
     """
     nums, den = polynomials(block)
-    if rule == "none":
-        shift = flint.fmpq_poly([1, 1])
+    if rule in ("none", "s"):
+        shift = flint.fmpq_poly([int(rule == "none"), 1])
         return _roots(den(shift)), [(_leading_ratio(num, den), _roots(num(shift))) for num in nums]
     s = _roots(den)
     if rule == "tustin":

@@ -24,7 +24,7 @@ from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Real, Whole
 from tfarm.case import Case
-from tfarm.dsp.discretise import discretise_law, system_matrix
+from tfarm.dsp.discretise import back_calculation, discretise_law, system_matrix
 from tfarm.dsp.kernel import DAC
 from tfarm.dsp.simulate import quantisers
 from tfarm.errors import must_be_known, require
@@ -140,7 +140,7 @@ class Controller:
 
     `signals` and `references` are the names of its inputs, before the feedforward; `ranges` are largest absolute values
     by name, where known; `dac` is the step (0: none), the lowest and the highest output; `hub` is the pole and the
-    period [s] of an estimated hub rate.
+    period [s] of an estimated hub rate.  `back` is that of `back_calculation`, in the numbers of the target.
     """
 
     word: Word
@@ -150,6 +150,7 @@ class Controller:
     dac: Real
     delay: int
     hub: tuple[float, float] | None
+    back: Real
 
     @cached_property
     def plan(self) -> Whole:
@@ -200,7 +201,8 @@ class Controller:
             run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, outputs, status)
         else:
             hub = np.array([self.signals.index(ANGLE), *self.hub] if self.hub else [-1.0, 0.0, 1.0])
-            run_real(table, self.plan, inputs, self.dac, hub, word.precision == "float", outputs, status)
+            is_single = word.precision == "float"
+            run_real(table, self.plan, inputs, self.dac, self.back, hub, is_single, outputs, status)
         # a refused sample moves no delay line: the output is held
         is_good = ~np.isin(status, (Status.INPUT_ERROR, Status.OVERFLOW))
         line = np.r_[np.zeros(1 + self.delay, kind), outputs[is_good]]
@@ -233,6 +235,11 @@ def word_length(
     word = controller.word
     low, high = controller.limits
     bounds = word.bounds
+    is_clipped = bounds.output + bounds.error > min(-low, high)
+    unknown = "not determined: the law is unstable or ill-conditioned in z"
+    if is_clipped and controller.back.size > 2:
+        unknown = "not determined: back-calculation acts while the output is clipped"
+        bounds = bounds._replace(states=np.inf + bounds.states, output=math.inf, error=math.inf)
     samples = None if bounds.is_whole else MOST_SUMMED
     excluded = "excluded for inputs within their ranges"
     if samples:
@@ -241,7 +248,7 @@ def word_length(
     largest = 1.0 if word.precision == FIXED else float(np.finfo(FLOATS[word.precision][0]).max)
     overflow = "not excluded: a state may saturate, and the bounds hold until it does"
     if bounds.output == math.inf:
-        overflow = "not determined: the law is unstable or ill-conditioned in z"
+        overflow = unknown
     elif max(bounds.states, default=0.0) < largest:
         overflow = excluded
     saturation = "no limit" if high == math.inf else f"saturates from {low!r} down and from {high!r} up"
@@ -331,7 +338,13 @@ def controller_of(law: Law, task: ExportTask) -> Controller:
     steps = math.log2(max(1.0, float(dac[0]) / word.output * 2.0**31))
     remedy = f"q31 has steps of a DAC that are a power of 2 of its own: output={limit!r}, or this times a power of 2"
     require(task.precision != FIXED or steps.is_integer(), "range.output", word.output, remedy)
-    return Controller(word, signals, references, ranges, dac, round(law.delay / T), hub)
+    back = back_calculation(law, dac[1:])
+    remedy = "back-calculation is in double or float; for q31 set it to 0"
+    is_exported = back.size == 2 or task.precision != FIXED
+    require(is_exported, "law.anti_windup", law.anti_windup, remedy)
+    if task.precision != FIXED:
+        back = back.astype(FLOATS[task.precision][0]).astype(float)
+    return Controller(word, signals, references, ranges, dac, round(law.delay / T), hub, back)
 
 
 # ------------------------------------------------------------ values of the templates
@@ -363,6 +376,9 @@ def template_values(task: ExportTask, controller: Controller, ports: Sequence[Po
         "table": [[literal(x, suffix) for x in row] for row in word.table.tolist()],
         "errors": [f"{known[of]} - {known[less]}".strip() for of, less in controller.plan.tolist()],
         "converter": bool(np.isfinite(dac).all()),
+        "back": [literal(each, suffix) for each in controller.back.tolist()]
+        if controller.back.size > 2
+        else None,
         "delay": controller.delay,
         "step": dac.tolist()[0],
         "dac": [literal(each, "") for each in dac.tolist()],

@@ -28,7 +28,7 @@ from tfarm.arrays import Complex, Real
 from tfarm.dsp import Simulator, scenario
 from tfarm.dsp.plant import MODES_USED, RECORDED
 from tfarm.dsp.results import simulate_modes
-from tfarm.dsp.scenarios import TRIAL_DURATION
+from tfarm.dsp.scenarios import TRIAL_DURATION, slew_scenario
 from tfarm.errors import ParameterError, one_line, require
 from tfarm.exact.outputs import signal_words
 from tfarm.exported.controller import controller_of, in_z, source_files
@@ -158,7 +158,7 @@ def prepared_simulator(task: ExportTask) -> Simulator:
     """
     case = task.case.under(replace(task.case.law, delay=0.0)) if task.what == "plant" else task.case
     try:
-        run = scenario("slew", case.arm, case.chain, TRIAL_DURATION)
+        run = slew_scenario(case.arm, case.chain, TRIAL_DURATION)
     except ParameterError:
         # an arm that cannot turn
         run = scenario("step", case.arm, case.chain, TRIAL_DURATION)

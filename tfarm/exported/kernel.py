@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tfarm.dsp.kernel import DAC, estimate, law_step, quantise, to_precision
+from tfarm.dsp.kernel import DAC, calculate_back, estimate, law_step, quantise, to_precision
 from tfarm.exact.compiled import compiled, inlined
 
 
@@ -25,12 +25,21 @@ def numbers_of(*statuses: Status) -> dict[str, int]:
 
 @compiled
 def run_real(
-    table: Any, plan: Any, inputs: Any, dac: Any, hub: Any, single: bool, outputs: Any, status: Any
+    table: Any,
+    plan: Any,
+    inputs: Any,
+    dac: Any,
+    back: Any,
+    hub: Any,
+    single: bool,
+    outputs: Any,
+    status: Any,
 ) -> None:
     """Fill outputs and status (n,) of inputs (n, k), the last of which is the feedforward; refused ones are left as 0.
 
     `table` is [A B; C D]; `plan` (columns, 2) has the two numbers whose difference is e of a column, by their places
-    among the inputs, an estimated hub rate and 0; `dac` is a row of the quantisers; `hub` index of the hub angle (-1:
+    among the inputs, an estimated hub rate and 0; `dac` is a row of the quantisers; `back` is that of
+    `tfarm.dsp.discretise.back_calculation`; `hub` index of the hub angle (-1:
     no estimate), pole and period of the estimated rate.
     """
     n = table.shape[0] - 1
@@ -52,6 +61,7 @@ def run_real(
                 e = known[plan[j, 0]] - known[plan[j, 1]]
                 z[n + j] = to_precision(e, single)
             law_step(table, z, known[forward], single, following)
+            calculate_back(following, back, single)
             if np.isfinite(following).all():
                 z[:n] = following[:n]
                 u = quantise(following[n], dac, clipped, DAC)

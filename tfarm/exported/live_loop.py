@@ -52,6 +52,7 @@ CONSUMER = Consumer(
     "live page",
     acts=(
         "reference",
+        "shaper",
         "anti-alias filter",
         "encoder",
         "hub rate",
@@ -387,7 +388,7 @@ def slew_numbers(case: Case) -> LiveNumbers | None:
     arm = case.arm
     chain = case.chain
     try:
-        task = scenario("slew", arm, chain, TRIAL_SLEWS * chain.slew.rise_time)
+        task = scenario("slew", arm, chain, TRIAL_SLEWS * chain.slew.rise_time, case.law)
         if task.t.size > 5000:
             return None
         ideal = case.through(ideal_chain(chain))

@@ -62,6 +62,9 @@ class ExportTask:
     def sha256(self) -> str:
         """SHA-256 of arm, chain, law (none of default gains) and tuner."""
         law = None if self.is_default else asdict(self.case.law)
+        # so that laws without have the sum that they always had
+        if law is not None and not law["anti_windup"]:
+            del law["anti_windup"]
         tuned = "" if self.tuned is None else self.tuned.read_text(encoding="utf-8")
         inputs = [file_text(self.case.arm, self.case.chain), law, tuned]
         text = json.dumps(inputs, sort_keys=True, default=lambda a: a.tolist())

@@ -50,7 +50,7 @@ CONSUMER = Consumer(
     acts=("anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
     named=("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit"),
     partly=("arithmetic",),
-    none=("reference", "volts"),
+    none=("reference", "shaper", "volts"),
 )
 
 

@@ -32,10 +32,12 @@ Of the sampled loop:
 * `sampled`: the loop, its matrix and its characteristic function
 * `sampled_poles`: closed-loop poles with all digits
 * `sampled_modes`: effect on each mode, and loci
+* `left_poles`: poles that decay within a sample, their bound and response
 * `circle`: certified count of poles outside the unit circle
 * `circle_crossings`: crossings of the unit circle, stability intervals and maps
 * `edges`: limits of stability with certified digits
 * `sampled_verdict`: the verdict, certified or converged
 * `sampled_analysis`: verdict, stability intervals, delay margin, modes and minimum damping
+* `norms`: H-infinity norms of weighted functions, with certified bounds
 * `sampled_brief`: the verdict in short
 """

@@ -37,7 +37,7 @@ there the undamped shear of this model has poles arbitrarily near to the imagina
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
 from itertools import takewhile
@@ -49,6 +49,7 @@ from numpy.typing import NDArray
 from tfarm.arrays import MACHINE_EPS, Complex, Real
 from tfarm.dsp.pulse import phi
 from tfarm.errors import ConvergenceError
+from tfarm.loop.left_poles import LeftResponse, bound_left_of, filter_bound, left_response
 from tfarm.loop.sampled import Sampled, with_more_modes
 from tfarm.records import frozen
 from tfarm.spectrum import modes
@@ -100,19 +101,29 @@ class Arcs(NamedTuple):
         return add_discs(self.inverse_power(n).times(each) for n, each in enumerate(coefficients))
 
 
+class UsedTerm(NamedTuple):
+    """A term of a loop's F under some weights: its row among `Circle.parts`, signal (-1 of q), factor, power of x."""
+
+    part: int
+    signal: int
+    factor: float
+    order: int
+
+
 @dataclass
 class Circle:
     """The upper half of the unit circle in arcs, and on each the terms of a loop's F; its weights do not matter.
 
     `missing` (signals,) bounds |x sum over poles left out|.  `low` and `high` [rad] are the ends of the arcs, `parts`
     the discs (1 + terms, arcs) of x and of the terms of F z^-n without their `powers` of x; `first_arcs` are cut as
-    counts need it.
+    counts need it.  With the response of the poles `left` of the line `missing` bounds the others.
     """
 
     loop: Sampled
     kept: NDArray[np.bool_]
     missing: Real
     first_arcs: int = 64
+    left: LeftResponse | None = None
     low: Real = field(init=False)
     high: Real = field(init=False)
     parts: Discs = field(init=False)
@@ -121,7 +132,7 @@ class Circle:
         ends = np.linspace(0.0, np.pi, self.first_arcs + 1)
         self.low = ends[:-1]
         self.high = ends[1:]
-        self.parts = self._parts(self.low, self.high)
+        self.parts = self.parts_on(self.low, self.high)
 
     def count(self, weights: Sequence[float]) -> int | None:
         """Return the number of poles outside the circle under these weights, without z = 1 of a free angle.
@@ -160,27 +171,37 @@ class Circle:
 
     def characteristic(self, weights: Sequence[float]) -> Discs:
         """Return x^k F z^-n on every arc, k the least that leaves no pole at z = 1."""
+        x = self.parts[0]
+        used = self.used_terms(weights)
+        return add_discs((power(x, each.order) * self.parts[each.part]).times(each.factor) for each in used)
+
+    def used_terms(self, weights: Sequence[float]) -> list[UsedTerm]:
+        """Return the terms of x^k F z^-n under these weights, that of q first."""
         row = (*weights, 1.0)
-        used = []
+        found = []
         for n, (part, signal, gain, roots) in enumerate(self.terms, start=1):
             factor = row[part] * gain
             if factor:
-                used.append((factor, int((roots == 0).sum()) - self.orders[signal], self.parts[n]))
-        least = min(exponent for _, exponent, _ in used)
-        x = self.parts[0]
-        return add_discs((power(x, n - least) * disc).times(factor) for factor, n, disc in used)
+                order = int((roots == 0).sum()) - self.orders[signal]
+                found.append(UsedTerm(n, signal, factor, order))
+        least = min(each.order for each in found)
+        return [each._replace(order=each.order - least) for each in found]
 
-    def _parts(self, low: Real, high: Real) -> Discs:
+    def law_term(self, arcs: Arcs, roots: Complex) -> Discs:
+        """Return prod(z - r) z^-n of a term's roots, less 1 given, without its powers of x."""
+        late = self.loop.in_z.poles.size - roots.size
+        return root_ratio(arcs.x, roots[roots != 0]) * arcs.inverse_power(late)
+
+    def parts_on(self, low: Real, high: Real) -> Discs:
         """Return x, and the terms of F z^-n without powers of x, on arcs."""
         arcs = Arcs((low + high) / 2, (high - low) / 2)
         late = arcs.inverse_power(1)
         sums = self.pole_sums(arcs, self.weights)
         n = len(self.orders) - 1
         signals = [self._output(row, arcs, sums[row] + sums[n + row] * late, sums[-1]) for row in range(n)]
-        order = self.loop.in_z.poles.size
         found = [arcs.x]
         for _, row, _, roots in self.terms:
-            term = root_ratio(arcs.x, roots[roots != 0]) * arcs.inverse_power(order - roots.size)
+            term = self.law_term(arcs, roots)
             found.append(term if row < 0 else term * signals[row])
         return Discs(np.array([each.middle for each in found]), np.array([each.radius for each in found]))
 
@@ -195,6 +216,8 @@ class Circle:
         late = arcs.inverse_power(1)
         at_rest = float(plant.static[row] - (plant.residues[row] / plant.poles)[~self.kept].real.sum())
         finite = of_poles + late.times(at_rest) + Discs(0 * x.middle, self.missing[row])
+        if self.left is not None:
+            finite = finite + x * late * arcs.polynomial(*self.left.moments[row])
         total = power(x, order) * finite
         push = arcs.polynomial(sampling.remaining, sampling.late) * late
         # then there is no 1/s: an arm that turns freely has no friction at the hub
@@ -213,7 +236,7 @@ class Circle:
         ends = np.linspace(self.low[rough], self.high[rough], pieces + 1)
         low = ends[:-1].ravel()
         high = ends[1:].ravel()
-        new = self._parts(low, high)
+        new = self.parts_on(low, high)
         order = np.argsort(np.r_[self.low[~rough], low])
 
         def merge(old: Any, new: Any) -> Any:
@@ -318,13 +341,14 @@ class Band:
     """The poles `kept` (poles,) of a loop's plant in a band up to `top` [rad/s].
 
     `missing` (outputs,) bounds the share of all other poles of that band in the pulse transfer functions, on the whole
-    unit circle.
+    unit circle; they are left of Re s = -`line`.
     """
 
     loop: Sampled
     top: float
     kept: NDArray[np.bool_]
     missing: Real
+    line: float
 
     @property
     def modes(self) -> int:
@@ -340,6 +364,13 @@ class Band:
     def circle(self) -> Circle:
         """The unit circle, for counts of the poles outside."""
         return Circle(self.loop, self.kept, self.missing)
+
+    @cached_property
+    def fine_circle(self) -> Circle:
+        """The unit circle with the response of the poles left of the line, for bounds that need more than a count."""
+        left = left_response(self.loop, self.line, self.top)
+        missing = left.error + filter_bound(self.loop, self.line)
+        return Circle(self.loop, self.kept, missing, left=left)
 
 
 def complete_band(loop: Sampled) -> Band | None:
@@ -357,7 +388,7 @@ def complete_band(loop: Sampled) -> Band | None:
     if top is None or missing is None:
         return None
     kept = (plant.poles.real > -line) & (abs(plant.poles.imag) < top)
-    return Band(loop, top, kept, missing + filter_bound(loop, line))
+    return Band(loop, top, kept, missing + filter_bound(loop, line), line)
 
 
 def _highest_complete(loop: Sampled, line: float) -> float | None:
@@ -383,67 +414,3 @@ def _highest_complete(loop: Sampled, line: float) -> float | None:
         return tops[-1] * max([1.0, *takewhile(lambda factor: is_complete(factor * tops[-1]), higher)])
     number = bisect_left(tops[:-1], True, key=lambda top: not is_complete(top))
     return tops[number - 1] if number else None
-
-
-def bound_left_of(loop: Sampled, line: float, top: float) -> Real | None:
-    """Return the bound on all poles of the band left of the line; None where the integral does not converge."""
-    sampling = loop.chain.sampling
-    exact = loop.rig.exact
-    analog = np.array(loop.rig.analog)[:, None]
-    remaining = sampling.remaining
-
-    def sizes(s: Complex) -> Real:
-        decay = np.exp(s.real * remaining) / -np.expm1(s.real * sampling.period)
-        antialias = np.where(analog, 1 / (1 + s / sampling.antialias_corner), 1.0)
-        return abs(exact(s) * antialias / s) * decay
-
-    # the first panel up the line is ten times finer than its distance from the axis
-    up = _bound_integral(lambda w: sizes(-line + 1j * w), _panel_ends(line / 10, top))
-    # along the top from 0.01 of 1/remaining on, until e^-45 = 3e-20 is left
-    beyond = line + _panel_ends(0.01 / remaining, 45.0 / remaining)
-    away = _bound_integral(lambda c: sizes(-c + 1j * top), beyond)
-    if up is None or away is None:
-        return None
-    return (up + away) * (2 / np.pi)
-
-
-def _panel_ends(first: float, last: float) -> Real:
-    """Return the ends of panels from 0 to `last`, geometric from `first` on."""
-    # panels are halved where quadratures differ: their number is time alone
-    return np.r_[0.0, np.geomspace(min(first, last / 2), last, 40)]
-
-
-def _bound_integral(size: Callable[[Real], Real], ends: Real) -> Real | None:
-    """Return the bound (outputs,) on the integral of an absolute value; None where it does not converge.
-
-    It is the larger of two quadratures by midpoints, halved until they differ by a tenth of it at most, and a fifth
-    on top.
-    """
-    difference = 0.1
-    before: Real | None = None
-    # a quadrature for which that is not enough has not converged
-    while ends.size < 200_000:
-        middles = (ends[1:] + ends[:-1]) / 2
-        values = size(middles) @ np.diff(ends)
-        if before is not None:
-            larger = np.maximum(values, before)
-            if (abs(values - before) <= difference * larger).all():
-                return larger * (1 + 2 * difference)
-        before = values
-        ends = np.sort(np.r_[ends, middles])
-    return None
-
-
-def filter_bound(loop: Sampled, line: float) -> Real:
-    """Return the bound on the error of the filter's own pole: its residue is the model's at -wc, not the arm's."""
-    sampling = loop.chain.sampling
-    plant = loop.plant
-    corner = sampling.antialias_corner
-    # then none of the kept poles is it, and the integral has it right
-    if corner >= line or not any(loop.rig.analog):
-        return np.zeros(len(loop.rig.analog))
-    residues = plant.residues[:, plant.mode.size - 1]
-    arm = loop.rig.exact(np.array([-corner + 0j]))[:, 0]
-    wrong = np.where(residues == 0, 0.0, abs(residues / corner - arm))
-    left = sampling.period * corner
-    return wrong * np.exp(-left * (1 - sampling.fraction)) * 2 / (1 + np.exp(-left))

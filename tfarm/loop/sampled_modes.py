@@ -11,17 +11,17 @@ never destabilises.  At finite gains the closed-loop pole itself is followed fro
 enough values to be smooth, and each branch is named after the mode where it begins.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN
 from tfarm.arrays import Complex, Real, Whole
 from tfarm.crossing.turning import loose
+from tfarm.dsp.branches import follow_branches, match_poles
 from tfarm.loop.sampled import Sampled
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -162,21 +162,6 @@ def mode_table(loop: Sampled) -> ModeTable:
     )
 
 
-def follow_branches(poles: Sequence[Complex], values: Real) -> Complex:
-    """Return the poles at each of the values, in any order, as branches (values, poles): each column is continuous.
-
-    The values must be close enough for branches to be distinguished.
-    """
-    rows: list[Complex] = []
-    for number, z in enumerate(poles):
-        ahead = rows[-1] if rows else z
-        if len(rows) > 2:
-            before, last, wanted = values[number - 2 : number + 1]
-            ahead = ahead + (wanted - last) / (last - before) * (rows[-1] - rows[-2])
-        rows.append(z[_match(ahead, z)])
-    return np.array(rows)
-
-
 # four loops are kept: memory against time, of no effect on a result
 @lru_cache(maxsize=4)
 def origins(loop: Sampled) -> NDArray[np.int64]:
@@ -192,10 +177,10 @@ def origins(loop: Sampled) -> NDArray[np.int64]:
     # 1e-6 of the gains: there each pole is still at that of the plant
     scales = np.r_[1e-6, np.arange(1, following_steps) / following_steps, 1.0]
     first, *others = (loop.times(scale).eigenvalues for scale in scales[:-1].tolist())
-    poles = [first[_match(open_loop[labels], first)], *others, loop.eigenvalues]
+    poles = [first[match_poles(open_loop[labels], first)], *others, loop.eigenvalues]
     ends = follow_branches(poles, scales)[-1]
     origin = np.full(loop.eigenvalues.size, -1)
-    origin[_match(ends, loop.eigenvalues)] = labels
+    origin[match_poles(ends, loop.eigenvalues)] = labels
     origin.flags.writeable = False
     return origin
 
@@ -213,12 +198,6 @@ def dominant(loop: Sampled) -> str:
     if origin >= 0 and loop.pulse.poles[origin].imag:
         return "an unassigned mode"
     return "the hub"
-
-
-def _match(ahead: Complex, z: Complex) -> NDArray[np.int64]:
-    """Return the poles in the order of the branches that they continue: the assignment of least total distance."""
-    _, order = linear_sum_assignment(abs(ahead[:, None] - z))
-    return order
 
 
 # ------------------------------------------------------------ loci

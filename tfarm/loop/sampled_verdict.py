@@ -29,7 +29,7 @@ SAMPLED_LOOP = Consumer(
     acts=("anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
     named=("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit"),
     partly=("arithmetic",),
-    none=("reference", "volts"),
+    none=("reference", "shaper", "volts"),
 )
 # of an undamped arm, whose verdict is of the first modes alone
 UNDAMPED_MODES = 20

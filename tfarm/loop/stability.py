@@ -61,6 +61,7 @@ CONTINUOUS = Consumer(
     named=("torque limit",),
     none=(
         "reference",
+        "shaper",
         "anti-alias filter",
         "encoder",
         "hub rate",

@@ -19,6 +19,7 @@ In the look of the report's pages, whose pictures these are.  This is the only r
 - `animation`: the arm in motion, a GIF
 - `studies`: distributions of a study
 - `fronts`: speed against robustness
+- `references`: a shaped reference, and its residual over the error of the frequency
 """
 
 from tfarm.moved import moved
@@ -28,6 +29,7 @@ from tfarm.plots.frequency import bode, measured_response
 from tfarm.plots.fronts import trade_off
 from tfarm.plots.loop_function import disc, loop, nichols, nyquist, sensitivity
 from tfarm.plots.motion import modes, slew, step, tuned_gain
+from tfarm.plots.references import reference
 from tfarm.plots.regions import comparison, gain_map, gain_regions
 from tfarm.plots.roots import locus
 from tfarm.plots.studies import study, study_band, study_scatter
@@ -47,6 +49,7 @@ __all__ = [
     "modes",
     "nichols",
     "nyquist",
+    "reference",
     "sensitivity",
     "sketch",
     "slew",

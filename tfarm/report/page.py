@@ -446,7 +446,7 @@ def has_loop(arm: Arm) -> bool:
 def best(arm: Arm, chain: Chain) -> Design | None:
     """The optimum of `tfarm design ARM`; None where no gains within its bounds hold, or the moment has no place."""
     try:
-        found = design(arm, modes=DESIGNED_MODES, chain=chain) if has_loop(arm) else None
+        found = design(arm, "damping", modes=DESIGNED_MODES, chain=chain) if has_loop(arm) else None
     except ConvergenceError:
         return None
     # where the hub does not move there is no law to draw

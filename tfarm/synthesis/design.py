@@ -4,16 +4,18 @@ A search within bounds by a judge of few modes is followed by exact verdicts, wh
 has the number of searches that agreed, the width of the optimum, and whether the bounds cut the search off.
 """
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import islice
 from operator import attrgetter, itemgetter
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm, must_turn
+from tfarm.arm import TWO_GAINS, AnyLaw, Arm, must_turn
 from tfarm.arm.stages import Consumer
 from tfarm.case import Case
 from tfarm.dsp import Chain
@@ -22,16 +24,15 @@ from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.errors import require as require_that
 from tfarm.loop.continuous import ContinuousLoop
-from tfarm.loop.edges import most_modes
 from tfarm.loop.sampled_brief import SampledBrief, sampled_brief
-from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import Stability, stability
 from tfarm.records import frozen
 from tfarm.schema import Quantity
+from tfarm.synthesis.drawn import AnyStudy, Verification, drawn_arms, verify, violation_on
 from tfarm.synthesis.goals import Checked
 from tfarm.synthesis.judge import LOST, OBJECTIVES, TOO_SLOW, Judge, judge_of, model_sizes
 from tfarm.synthesis.models import slew_and_after, trial_slew
-from tfarm.synthesis.required import RequiredLaw, RequirementTask, Sensitivity, is_active, names_of
+from tfarm.synthesis.required import RequiredLaw, RequirementTask, Sensitivity, is_active, names_of, why_none
 from tfarm.synthesis.requirements import MEASURES, Wanted, measure_named, requirements_of
 from tfarm.synthesis.search import Search, Worst, flat_part, search
 from tfarm.synthesis.structures import STRUCTURES, Bounds, Structure, check_bounds, structure_of
@@ -196,6 +197,11 @@ class Design:
         Quantity("sensitivities", help="changes of the required quantities, sampled loop, by the model"),
     ] = ()
 
+    verification: Annotated[
+        Verification | None,
+        Quantity("fresh arms", help="requirements on arms drawn from a study or posterior"),
+    ] = None
+
     @property
     def is_met(
         self,
@@ -296,6 +302,9 @@ def design(
     progress: Tell | None = None,
     also: Sequence[Arm] = (),
     ranges: Mapping[str, Bounds] | None = None,
+    study: AnyStudy | None = None,
+    posterior: str | os.PathLike[str] | None = None,
+    fresh: int = 64,
 ) -> Design:
     """Return the law of a structure with the best value of an objective in the sampled loop of a chain (default 10 ms).
 
@@ -312,15 +321,23 @@ def design(
     Objectives without requirements are "damping" of the first `modes` modes, "margin", "sensitivity", "delay",
     "residual" and "cost", of laws with a dominant time constant of at most four periods of mode 1, or 50 samples.  The
     law is stable when sampled, with all gains a quarter larger or smaller, and in continuous time.
-    `continuous`: for the continuous-time loop instead; its best law may be unstable when sampled.
+    `continuous`: for the continuous-time loop instead, by "damping" unless another objective is named; its best law may
+    be unstable when sampled.
     `progress` is called with one line at a time.
 
     `also` are further arms for the law, `ranges` the ends of numbers of the arm, such as {"payload.mass": (0.1, 0.5)}.
     The objective is then the worst of the arm, of those, of the corners of the box, and of worse arms inside it that a
     search finds, which is no proof over the box.  The law is stable on each arm in `.arms`; references and feed-forward
-    are those of the arm itself.  Raises ParameterError for options that exclude each other, ConvergenceError where no
+    are those of the arm itself.
+
+    `study` is the file of a study, or its table of distributions, `posterior` that of a fit: requirements are met on
+    the worst arms of a pool drawn from them, and `fresh` further arms examine the law, `.verification`.
+
+    Raises ParameterError for options that exclude each other, ConvergenceError where no
     stable law is found.
     """
+    if continuous and objective is None and require is None:
+        objective = "damping"
     is_plain = require is None and objective in OBJECTIVES
     remedy = "requirements are of both loops: leave out the continuous-time loop"
     require_that(is_plain or not continuous, "continuous", continuous, remedy)
@@ -329,6 +346,9 @@ def design(
     options = _Options(
         arm, structure, {"K1": K1, "K2": K2}, Kp, modes, chain or Chain(), tuple(also), box, progress
     )
+    is_of_drawn = study is not None or posterior is not None
+    remedy = "requirements hold on arms of a study or posterior: name --minimise by one of their quantities"
+    require_that(not (is_plain and is_of_drawn), "objective", objective, remedy)
     if is_plain:
         remedy = "the cost of the tuner's trial is one of samples: design for the sampled loop"
         require_that(objective != "cost" or not continuous, "objective", objective, remedy)
@@ -338,7 +358,13 @@ def design(
         task = _DesignTask(arm, str(objective), form, modes, options.chain, continuous, options.tell)
         return task.design(*for_the_worst(arms, box, task.find, task.score_on, options.tell))
     search_for, arms = options.task(objective, require)
-    found, named, case = for_the_worst(arms, box, search_for.find, search_for.score_on, options.tell)
+    drawn = None
+    worst = search_for.score_on
+    if is_of_drawn:
+        require_that(box is None, "range", ranges, "a study or posterior has its own ranges: leave these out")
+        drawn = drawn_arms(arm, study, posterior, fresh)
+        worst = partial(violation_on, search_for)
+    found, named, case = for_the_worst(arms, box or drawn, search_for.find, worst, options.tell)
     conflicts: tuple[str, ...] = ()
     alternatives: tuple[str, ...] = ()
     if found.violation > 0:
@@ -349,6 +375,7 @@ def design(
         _record(search_for, found, named, case, is_continuous=False),
         requirements=found.checked,
         sensitivities=tuple(search_for.sensitivities(found)),
+        verification=verify(search_for, found, drawn, options.tell) if drawn is not None else None,
         conflicts=conflicts,
         alternatives=alternatives,
     )
@@ -367,17 +394,18 @@ def trade_off(
     chain: Chain | None = None,
     progress: Tell | None = None,
     also: Sequence[Arm] = (),
+    number: int = 12,
 ) -> TradeOff:
-    """Return the front of speed against robustness: 12 designs, from 0.4 to 1.9 times the limits of the grade good.
+    """Return the front of speed against robustness: designs from 0.4 to 1.9 times the limits of the grade good.
 
     Arguments are those of `design`; the dominant time constant is minimised unless another quantity is named.
-    Requirements of other quantities than gain, phase and delay margin and Ms hold at
-    every point.  Raises ParameterError as `design` does, ConvergenceError where no law is stable on all arms.
+    Requirements of other quantities than gain, phase and delay margin and Ms hold at every one of the `number` designs.
+    Raises ParameterError as `design` does, ConvergenceError where no law is stable on all arms.
     """
     options = _Options(
         arm, structure, {"K1": K1, "K2": K2}, Kp, modes, chain or Chain(), tuple(also), None, progress
     )
-    return front(*options.task(objective or "time-constant", require))
+    return front(*options.task(objective or "time-constant", require), number)
 
 
 @frozen
@@ -430,6 +458,8 @@ class _Options:
             # an arm that cannot turn has no slew
             objective = "settling" if self.arm.has_rigid_mode else "time-constant"
         minimised = measure_named(objective, "objective")
+        remedy = "is large in a good loop: require it, and minimise settling, time-constant, torque or Ms"
+        require_that(MEASURES[minimised].sense == "<=", "objective", objective, remedy)
         limits = requirements_of("good" if wanted is None else wanted)
         if MEASURES[minimised].of_slew or any(each.measure.of_slew for each in limits):
             must_turn(self.arm)
@@ -505,7 +535,7 @@ class _DesignTask:
         score, x = nearest
         law = self.form.record_at(x)
         chain = None if self.continuous else self.chain
-        words = _why_none(named, self.form, law, chain, max(map(max, sizes)))
+        words = why_none(named, self.form, law, chain, max(map(max, sizes)))
         if len(named) > 1:
             words = f"{words}; for {len(named)} arms at once: {'; '.join(each.name for each in named)}"
         raise ConvergenceError(words, law, score)
@@ -562,29 +592,4 @@ def _record(
         starts=choice.search.starts,
         agreed=choice.search.agreed,
         worst_case=case,
-    )
-
-
-def _why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Chain | None, size: int) -> str:
-    """Return the most unstable mode under the law nearest to stability when sampled, the bounds, and a remedy.
-
-    `size` is the number of modes of the largest model.
-    """
-    within = " and ".join(f"{each.name} in ({each.bounds[0]:g}, {each.bounds[1]:g})" for each in form.free)
-    text = f"no law {form.name} with {within} was found that is stable"
-    if chain is None:
-        return f"{text}: widen the bounds"
-    verdicts = [sampled_verdict(Case(each.arm, law, chain)) for each in arms]
-    verdict = max(verdicts, key=attrgetter("log_radius"))
-    growth = np.expm1(verdict.log_radius)
-    nearest = f"{verdict.slowest} grows by {growth:.2g} a sample" if growth > 0 else "there is no reserve"
-    remedy = f"widen the bounds, or try another {ANGLE_GAIN} or period"
-    text = f"{text} when sampled: under the nearest law {nearest}; {remedy}"
-    if any(most_modes(each.arm, chain) > size for each in arms if not each.arm.has_elastic_link):
-        text = f"{text}; only models of up to {size} modes were searched"
-    if not verdict.loop.plant.arm.has_elastic_link or form.name == TWO_GAINS:
-        return text
-    return (
-        f"{text}; with link.damping = 0 every mode that the law does not damp at its alias is unstable under a held "
-        f"input: give link.damping, or take {TWO_GAINS}"
     )

@@ -1,8 +1,8 @@
 """Laws that meet requirements: the least value of a quantity, found on models and examined by the exact loops.
 
 1. Differential evolution on a model of few modes minimises log q + w sum max(0, v), q a quantity of the loop and v the
-   violations: an exact penalty (Fletcher, Practical Methods of Optimization, 1987, sec. 12.3), whose minimum lies on
-   the limits where the weight w is above the multipliers.
+   violations, with a floor of speed (`slowness`): an exact penalty (Fletcher, Practical Methods of Optimization, 1987,
+   sec. 12.3), whose minimum lies on the limits where the weight w is above the multipliers.
 2. A simplex of Nelder and Mead minimises quantities of the slew, which is simulated with its converters.
 3. The result card of the exact loops has the last word.  What it has less than the model tightens the requirement
    on the model, and the search goes on from there.
@@ -25,6 +25,7 @@ from tfarm.case import Case
 from tfarm.errors import ConvergenceError
 from tfarm.records import frozen
 from tfarm.schema import Quantity
+from tfarm.spectrum.gains import turning_inertia
 from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.requirements import Requirement
@@ -44,13 +45,15 @@ SHARE_OF_SPEED = 0.05
 class Goal:
     """The least value of a quantity under requirements, as an objective of a judge.
 
-    `shifts` tighten each requirement of the sampled (0) and of the continuous-time loop (1) on the model.  A violation
-    counts by the `weight`.
+    `shifts` tighten each requirement of the sampled (0) and of the continuous-time loop (1) on the model; `delays` are
+    further delays [periods] with which the sampled loop has to be stable.  A violation counts
+    by the `weight`.
     """
 
     requirements: tuple[Requirement, ...]
     minimised: str
     shifts: tuple[tuple[float, ...], tuple[float, ...]]
+    delays: tuple[float, ...] = ()
     weight: float = WEIGHT
 
     is_negated = False
@@ -76,7 +79,9 @@ class Goal:
             value = sampled.dominant_time_constant(first_frequency(judge.arm))
         else:
             value = sampled.of(self.minimised)
-        return np.log(np.maximum(value, LEAST_SIZE)) + self._penalty(judge, sampled)
+        return (
+            np.log(np.maximum(value, LEAST_SIZE)) + slowness(judge, entries) + self._penalty(judge, sampled)
+        )
 
     def _penalty(self, judge: Any, sampled: LoopMeasures) -> Real:
         """The weighted violations of requirements on the loops (laws,)."""
@@ -120,11 +125,13 @@ class Goal:
         if any(model.growth(model.poles(entries)).max() >= 0 for model in (judge.model, *judge.also)):
             return np.inf
         measures = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
-        score = float(self._penalty(judge, measures)[0])
+        score = float((slowness(judge, entries) + self._penalty(judge, measures))[0])
         speed = float(measures.dominant_time_constant(first_frequency(judge.arm))[0])
         figures = slew.of(law)
         if self.minimised == "settling_time_s":
-            score += float(np.log(figures[self.minimised] + SHARE_OF_SPEED * speed))
+            # a tip that does not settle in the longest record: of such laws the fastest is the best
+            settled = min(figures[self.minimised], 100.0 * speed)
+            score += float(np.log(settled + SHARE_OF_SPEED * speed))
         elif _is_of_slew(self.minimised):
             score += float(np.log(max(figures[self.minimised], LEAST_SIZE)))
         else:
@@ -147,6 +154,26 @@ class Goal:
     def value(self, judge: Any, law: AnyLaw) -> float:
         """Return the quantity of a law, by the best available method."""
         return exact_values(judge.case(law), slew_of(judge)).sampled[self.minimised]
+
+
+def slowness(judge: Any, entries: Sequence[Entry]) -> Real:
+    """Return log(J w^2/abs(C(i w))) of laws, at least 0 (laws,), with C from hub angle to input, at a low frequency w.
+
+    Below one the law is slower than w: without this floor a law of hardly any gain is the best where a vibration decays
+    more slowly than the hub, whatever the law, and for the least Ms or input.
+    """
+    # of the first frequency, or of a radian a sample: a little less than the speed of the angle of other designs
+    share = 0.08
+    w = share * min(first_frequency(judge.arm), 1 / judge.chain.sampling.period)
+    s = 1j * w
+    from_angle = {"hub_angle": 1.0, "hub_rate": s}
+    gain: Any = np.zeros(1)
+    for signal, num, den in entries:
+        if signal in from_angle:
+            gain = gain + from_angle[signal] * np.polyval(num, s) / np.polyval(den, s)
+    # no less: a law without these signals, whatever its coefficients
+    least = 1e-6
+    return np.asarray(-np.log(np.clip(abs(gain) / (turning_inertia(judge.arm) * w**2), least, 1.0)))
 
 
 def _is_of_slew(name: str) -> bool:

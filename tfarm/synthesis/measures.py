@@ -43,7 +43,12 @@ class LoopMeasures:
         at = real[:, :-1] + share * np.diff(real, axis=1)
         # through a pole L passes infinity, and the line between the points not the value of L
         passes = crosses & (at < 0) & (-at > 0.1 * np.minimum(size[:, 1:], size[:, :-1]))
-        return 20 * np.where(passes, abs(np.log10(np.maximum(-at, LEAST_SIZE))), np.inf).min(axis=1)
+        least = np.where(passes, abs(np.log10(np.maximum(-at, LEAST_SIZE))), np.inf).min(axis=1)
+        if self.model.period is not None:
+            # at z = -1, the end of the grid, L is real
+            end = real[:, -1]
+            least = np.where(end < 0, np.minimum(least, abs(np.log10(np.maximum(-end, LEAST_SIZE)))), least)
+        return 20 * least
 
     def phase_margin_deg(self) -> Real:
         """Return the least distance [deg] of L from -1 where abs(L) passes 1 (laws,)."""

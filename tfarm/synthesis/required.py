@@ -10,15 +10,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from operator import attrgetter
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import AnyLaw, Arm
+from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm
 from tfarm.arrays import Real
 from tfarm.assessment.card import graded_arm
+from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
+from tfarm.loop.edges import most_modes
+from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.synthesis.goals import WEIGHT, Checked, Goal, check, polished
@@ -32,10 +36,16 @@ from tfarm.synthesis.worst_case import Effort, NamedArm, Tell
 
 # of a violation on the models: less is met after a search that goes on
 MET = 1e-3
+# and without one requirement, where the others are looked at
+NEAR = 0.05
+DELAY = "delay_margin_periods"
 
 
 class RequiredLaw(NamedTuple):
-    """A law found for some arms, its goal with shifts, and the requirements with exact values on each arm."""
+    """A law found for some arms, its goal with shifts, and the requirements with exact values on each arm.
+
+    `violations` (2, requirements) are the largest on any arm, of the sampled and the continuous-time loop.
+    """
 
     worst: Worst
     search: Search
@@ -44,6 +54,7 @@ class RequiredLaw(NamedTuple):
     law: AnyLaw
     goal: Goal
     checked: tuple[Checked, ...]
+    violations: Real = np.zeros((2, 0))
 
     @property
     def violation(self) -> float:
@@ -97,14 +108,16 @@ class RequirementTask:
             own = judge_of(on, self.arm, self.chain, goal, self.form.signals, self.modes, most)
             found = replace(found, also=(*found.also, own.model, *own.also))
         sampling = found.chain.sampling
-        delays = [
-            # a little more, so that the exact margin is not below the limit by its rounding
-            share * each.limit * (1.0005 + shift) + sampling.delay_samples
-            for each, shift in zip(self.requirements, goal.shifts[0], strict=True)
-            for share in (1 / 3, 2 / 3, 1.0)
-            if each.name == "delay_margin_periods"
+        delays = list(goal.delays)
+        for each, shift in zip(self.requirements, goal.shifts[0], strict=True):
+            if each.name == DELAY:
+                # a little more, so that the exact margin is not below the limit by its rounding
+                longest = each.limit * (1.0005 + shift)
+                delays += [longest / 3, 2 * longest / 3, longest]
+        chains = [
+            replace(found.chain, sampling=replace(sampling, delay_samples=sampling.delay_samples + each))
+            for each in delays
         ]
-        chains = [replace(found.chain, sampling=replace(sampling, delay_samples=each)) for each in delays]
         signals = found.model.signals
         delayed = tuple(sampled_model(found.arm, each, signals, self.modes, count) for each in chains)
         return replace(found, delayed=delayed)
@@ -118,52 +131,72 @@ class RequirementTask:
         form = self.form if before is None else before.search.form
         near = None if before is None else before.x
         best: RequiredLaw | None = None
+        sizes = [model_sizes(each.arm, self.chain, self.modes, continuous=False) for each in named]
         step = 0
         for attempt in range(6):
             judges = tuple(self.judge(each.arm, goal, step) for each in named)
             found = search(Worst(judges[::-1]), form, self.tell, near, effort if attempt == 0 else "near")
-            score, x = found.found[0]
             form = found.form
-            if score >= LOST:
+            law = form.record_at(found.found[0][1])
+            if found.found[0][0] >= LOST:
                 break
-            if goal.by_simulation and effort != "sketch":
-                x = polished(goal, judges, form, x)
-                score = float(Worst(judges).scores(form, x[:, None])[0])
-            law = form.record_at(x)
             if effort == "sketch":
-                return RequiredLaw(Worst(judges), found, score, x, law, goal, ())
-            rows = []
-            violations = np.full((2, len(self.requirements)), -1.0)
-            for each, judge in zip(named, judges, strict=True):
-                own, exact = check(goal, judge, each, law)
-                rows += own
-                violations = np.maximum(violations, exact)
-            chosen = RequiredLaw(Worst(judges), found, score, x, law, goal, tuple(rows))
+                return RequiredLaw(Worst(judges), found, *found.found[0], law, goal, ())
+            candidates = (
+                self._examined(named, judges, found, x, goal) for score, x in found.found if score < LOST
+            )
+            # the best on the models may be unstable by a mode that they leave out
+            chosen = next((each for each in candidates if np.isfinite(each.violation)), None)
+            if chosen is None:
+                step += 1
+                if step >= max(map(len, sizes)):
+                    break
+                continue
             if best is None or chosen.violation < best.violation:
                 best = chosen
             if chosen.violation <= 0:
                 break
-            if goal.excess(judges, law) > MET:
+            near = chosen.x
+            if goal.excess(judges, chosen.law) > MET:
                 # the weight is below the multipliers, or no law meets the requirements
                 if goal.weight > WEIGHT:
                     break
-                near = x
                 goal = replace(goal, weight=10 * WEIGHT)
                 continue
-            if not np.isfinite(violations).all():
-                # unstable by a mode that the models leave out
-                if step + 1 >= max(
-                    len(model_sizes(each.arm, self.chain, self.modes, continuous=False)) for each in named
-                ):
-                    break
-                step += 1
-                continue
-            near = x
-            goal = goal.tighter(np.where(violations > 0, 1.1 * violations + 1e-5, 0.0))
-        if best is None or not np.isfinite(best.violation):
-            nearest = None if best is None else best.law
-            raise ConvergenceError("no law of the structure is stable on all arms", nearest, None)
+            goal = self._corrected(goal, chosen.violations)
+        if best is None:
+            raise ConvergenceError(why_none(named, form, law, self.chain, max(map(max, sizes))), law, None)
         return best
+
+    def _examined(
+        self, named: Sequence[NamedArm], judges: tuple[Judge, ...], found: Search, x: Real, goal: Goal
+    ) -> RequiredLaw:
+        """Return a law that was found, with the exact values of all requirements on each arm."""
+        form = found.form
+        if goal.by_simulation:
+            x = polished(goal, judges, form, x)
+        law = form.record_at(x)
+        score = float(Worst(judges).scores(form, x[:, None])[0])
+        rows = []
+        violations = np.full((2, len(self.requirements)), -1.0)
+        for each, judge in zip(named, judges, strict=True):
+            own, exact = check(goal, judge, each, law)
+            rows += own
+            violations = np.maximum(violations, exact)
+        return RequiredLaw(Worst(judges), found, score, x, law, goal, tuple(rows), violations)
+
+    def _corrected(self, goal: Goal, violations: Real) -> Goal:
+        """Return the goal with what the exact loops have less: shifts, and the delays that make a loop unstable."""
+        shifts = np.where(violations > 0, 1.1 * violations + 1e-5, 0.0)
+        for n, each in enumerate(self.requirements):
+            if each.name == DELAY and 0 < violations[0, n] < np.inf:
+                # the loop is unstable from there on, though not with every longer delay
+                first = each.limit * (1 - violations[0, n])
+                goal = replace(goal, delays=(*goal.delays, *np.linspace(first, each.limit, 5)[:-1].tolist()))
+                # an active limit is missed by rounding, one between two delays of the models by more
+                if violations[0, n] > 0.01:
+                    shifts[0, n] = 0.0
+        return goal.tighter(shifts)
 
     @property
     def objective(self) -> str:
@@ -193,7 +226,7 @@ class RequirementTask:
             judges = tuple(task.judge(of.arm, task.goal, 0) for of in named)
             result = search(Worst(judges[::-1]), choice.search.form, self.tell, choice.x, "near")
             law = result.form.record_at(result.found[0][1])
-            if task.goal.excess(judges, law) <= MET:
+            if task.goal.excess(judges, law) <= NEAR:
                 found.append(str(each))
         return tuple(found)
 
@@ -227,3 +260,28 @@ def is_active(checked: Checked) -> bool:
 def names_of(rows: Sequence[Checked], test: Any) -> list[str]:
     """Return the requirements of the rows that pass a test, each once."""
     return list(dict.fromkeys(each.requirement for each in rows if test(each)))
+
+
+def why_none(arms: Sequence[NamedArm], form: Structure, law: AnyLaw, chain: Chain | None, size: int) -> str:
+    """Return the most unstable mode under the law nearest to stability when sampled, the bounds, and a remedy.
+
+    `size` is the number of modes of the largest model.
+    """
+    within = " and ".join(f"{each.name} in ({each.bounds[0]:g}, {each.bounds[1]:g})" for each in form.free)
+    text = f"no law {form.name} with {within} was found that is stable"
+    if chain is None:
+        return f"{text}: widen the bounds"
+    verdicts = [sampled_verdict(Case(each.arm, law, chain)) for each in arms]
+    verdict = max(verdicts, key=attrgetter("log_radius"))
+    growth = np.expm1(verdict.log_radius)
+    nearest = f"{verdict.slowest} grows by {growth:.2g} a sample" if growth > 0 else "there is no reserve"
+    remedy = f"widen the bounds, or try another {ANGLE_GAIN} or period"
+    text = f"{text} when sampled: under the nearest law {nearest}; {remedy}"
+    if any(most_modes(each.arm, chain) > size for each in arms if not each.arm.has_elastic_link):
+        text = f"{text}; only models of up to {size} modes were searched"
+    if not verdict.loop.plant.arm.has_elastic_link or form.name == TWO_GAINS:
+        return text
+    return (
+        f"{text}; with link.damping = 0 every mode that the law does not damp at its alias is unstable under a held "
+        f"input: give link.damping, or take {TWO_GAINS}"
+    )

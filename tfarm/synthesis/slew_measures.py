@@ -9,13 +9,20 @@ import numpy as np
 from tfarm.arm import AnyLaw, Arm
 from tfarm.case import Case
 from tfarm.dsp import Chain, Scenario, traces
-from tfarm.dsp.scenarios import scenario
+from tfarm.dsp.scenarios import slew_scenario
+from tfarm.dsp.shaping import impulses_of
 from tfarm.dsp.simulate import Simulator
 from tfarm.dsp.simulation import final_value, settling_time
 from tfarm.records import frozen
 from tfarm.spectrum.table import first_frequency
 
 TIP = "tip_displacement"
+
+
+# records of a slew, in turn until the tip settles: times the first
+LENGTHS = (1, 6)
+# samples of a longer record: the time of a search
+MOST_SAMPLES = 10_000
 
 
 @frozen
@@ -28,29 +35,45 @@ class SlewMeasures:
     count: int
 
     @cached_property
-    def task(self) -> Scenario:
-        """The slew, and after it as long again or four periods of the first mode."""
+    def tasks(self) -> list[Scenario]:
+        """The slew without its shaper and as long again or four periods of mode 1, then a record for slow loops."""
         rise = self.chain.slew.rise_time
-        left = max(2 * rise, 4 * 2 * np.pi / first_frequency(self.arm), 64 * self.chain.sampling.period)
-        return scenario("slew", self.known, self.chain, rise + left)
+        period = self.chain.sampling.period
+        left = max(2 * rise, 4 * 2 * np.pi / first_frequency(self.arm), 64 * period)
+        if self.chain.reference.shaper != "none":
+            # a shaper of two modes may be as long as a period and a half
+            left += 3 * np.pi / first_frequency(self.arm)
+        durations = [rise + length * left for length in LENGTHS]
+        most = max(durations[0], MOST_SAMPLES * period)
+        return [slew_scenario(self.known, self.chain, each) for each in durations if each <= most]
 
     def of(self, law: AnyLaw) -> dict[str, float]:
-        """Return the figures by name of the measure, inf where the run stops or the tip does not settle."""
-        task = self.task
-        run = Simulator(
-            Case(self.arm, law, self.chain), task, count=self.count, between=4, outputs=(TIP,)
-        ).run()
-        names = ("settling_time_s", "overshoot", "residual_moment", "peak_input")
-        if run.stopped is not None:
-            return dict.fromkeys(names, np.inf)
-        t, y = traces.continuous(run, TIP)
-        final = final_value(run.at_samples.t, run.at_samples.signal(TIP))
-        travel = final - float(y[0])
-        settled = settling_time(t, abs(y - final), abs(travel), task.busy_until)
-        residual = run.residual_moment
-        return {
-            "settling_time_s": np.inf if settled is None else settled,
-            "overshoot": max(0.0, float((y / final).max()) - 1.0) if travel else 0.0,
-            "residual_moment": np.inf if residual is None else residual,
-            "peak_input": float(abs(run.torque).max()),
-        }
+        """Return the figures by name of the measure, inf where the run stops or the tip does not settle.
+
+        Those but the settling time are of the first record.
+        """
+        case = Case(self.arm, law, self.chain)
+        found: dict[str, float] = {}
+        impulses = impulses_of(self.known, self.chain, law)
+        for plain in self.tasks:
+            task = plain.through(impulses) if impulses.size > 1 else plain
+            run = Simulator(case, task, count=self.count, between=4, outputs=(TIP,)).run()
+            if run.stopped is not None:
+                names = ("settling_time_s", "overshoot", "residual_moment", "peak_input")
+                return dict.fromkeys(names, np.inf) | found
+            t, y = traces.continuous(run, TIP)
+            final = final_value(run.at_samples.t, run.at_samples.signal(TIP))
+            travel = final - float(y[0])
+            settled = settling_time(t, abs(y - final), abs(travel), task.busy_until)
+            if not found:
+                residual = run.residual_moment
+                found = {
+                    "settling_time_s": np.inf,
+                    "overshoot": max(0.0, float((y / final).max()) - 1.0) if travel else 0.0,
+                    "residual_moment": np.inf if residual is None else residual,
+                    "peak_input": float(abs(run.torque).max()),
+                }
+            if settled is not None:
+                found["settling_time_s"] = settled
+                break
+        return found

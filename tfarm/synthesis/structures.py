@@ -28,6 +28,7 @@ from tfarm.records import frozen
 from tfarm.spectrum import modes as natural_modes
 from tfarm.spectrum.gains import check_gains, rate_unit, turning_inertia
 from tfarm.spectrum.table import first_frequency
+from tfarm.synthesis.observer import filter_gain, held_model, integral_feedback, observer_law
 
 Bounds = tuple[float, float]
 
@@ -319,27 +320,47 @@ def _two_gains(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     return (K1, K2), entries
 
 
+def _by_mode(arm: Arm, modes: int) -> dict[str, float]:
+    """Return the frequencies [rad/s] of the first flexible modes by the ending of the names of their coefficients."""
+    flexible = natural_modes(arm, modes).natural_frequency[-modes:]
+    return {f"_{n}": w for n, w in enumerate(flexible.tolist(), 1)}
+
+
 @structure("PD", r"$v = -K_p \theta - K_1 \theta_t$")
 def _pd(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     return (_rate_gain(arm, Kp),), lambda Kp, c: _servo(Kp, c[0])
 
 
-@structure("PD+notch", r"$v = -(K_p + K_1 s/(1 + s/p)) \, N(s) \, \theta$")
-def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Built:
+def _notched(arm: Arm, Kp: float, period: float, names: Mapping[str, float]) -> Built:
+    """Return PD with a notch for each ending of its coefficients' names, which has the notch's frequency [rad/s]."""
+
     def entries(Kp: Any, c: Real) -> tuple[Entry, ...]:
-        K1, pole, w, a, b = c
-        num = multiply_polynomials(polynomial_of(K1 + Kp / pole, Kp), _second_order(w, a))
-        den = multiply_polynomials(polynomial_of(1 / pole, 1.0), _second_order(w, b))
+        K1, pole = c[:2]
+        num = polynomial_of(K1 + Kp / pole, Kp)
+        den = polynomial_of(1 / pole, 1.0)
+        for w, a, b in c[2:].reshape(len(names), 3, -1):
+            num = multiply_polynomials(num, _second_order(w, a))
+            den = multiply_polynomials(den, _second_order(w, b))
         return (Entry("hub_angle", num, den),)
 
-    free = (
-        _rate_gain(arm, Kp),
-        _pole(period),
-        positive_coefficient("notch_rad_s", min(first_frequency(arm), 1 / period), 2 / period),
-        positive_coefficient("notch_zero_damping", 0.1),
-        positive_coefficient("notch_pole_damping", 0.7),
-    )
+    free = [_rate_gain(arm, Kp), _pole(period)]
+    for name, w in names.items():
+        free += [
+            positive_coefficient(f"notch_rad_s{name}", min(w, 1 / period), 2 / period),
+            positive_coefficient(f"notch_zero_damping{name}", 0.1),
+            positive_coefficient(f"notch_pole_damping{name}", 0.7),
+        ]
     return free, entries
+
+
+@structure("PD+notch", r"$v = -(K_p + K_1 s/(1 + s/p)) \, N(s) \, \theta$")
+def _pd_notch(arm: Arm, Kp: float, modes: int, period: float) -> Built:
+    return _notched(arm, Kp, period, {"": first_frequency(arm)})
+
+
+@structure("PD+notches", r"$v = -(K_p + K_1 s/(1 + s/p)) \, \prod_i N_i(s) \, \theta$, a notch a mode")
+def _pd_notches(arm: Arm, Kp: float, modes: int, period: float) -> Built:
+    return _notched(arm, Kp, period, _by_mode(arm, modes))
 
 
 @structure("lead", r"$v = -K_p (1 + s/z)/(1 + s/p) \, \theta$")
@@ -370,32 +391,48 @@ def _pid(arm: Arm, Kp: float, modes: int, period: float) -> Built:
     return (_integral_gain(arm, Kp), _rate_gain(arm, Kp, "Kd"), _pole(period)), entries
 
 
-@structure(
-    "PPF",
-    r"PD, and $-\sum_i g_i \omega_i^2/(s^2 + 2 \zeta_i \omega_i s + \omega_i^2) \, M$ (positive position feedback)",
-)
-def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Built:
+def _mode_filters(
+    arm: Arm, Kp: float, modes: int, period: float, passed: Callable[[Any, Any, Any], Real]
+) -> Built:
+    """Return PD, and on the root moment a second-order filter for each mode, of a numerator of its g, w and zeta."""
+
     def entries(Kp: Any, c: Real) -> tuple[Entry, ...]:
         num = np.zeros((1, c.shape[1]))
         den = np.ones((1, 1))
         for g, w, zeta in c[1:].reshape(modes, 3, -1):
             own = _second_order(w, zeta)
+            through = multiply_polynomials(passed(g, w, zeta), den)
             num = multiply_polynomials(num, own)
-            num[2:] += g * w * w * den
+            num[-len(through) :] += through
             den = multiply_polynomials(den, own)
         return (*_servo(Kp, c[0]), Entry("root_moment", num, den))
 
     # of frequency and damping of a filter
     reach = np.exp(2.0)
     free = [_rate_gain(arm, Kp)]
-    flexible = natural_modes(arm, modes).natural_frequency[-modes:]
-    for n, w in enumerate(flexible.tolist(), 1):
+    for name, w in _by_mode(arm, modes).items():
         free += [
-            signed_coefficient(f"gain_{n}", 0.1 * arm.input_per_torque),
-            positive_coefficient(f"filter_rad_s_{n}", min(w, 1 / period), 2 / period, reach),
-            positive_coefficient(f"filter_damping_{n}", 0.3, reach=reach),
+            signed_coefficient(f"gain{name}", 0.1 * arm.input_per_torque),
+            positive_coefficient(f"filter_rad_s{name}", min(w, 1 / period), 2 / period, reach),
+            positive_coefficient(f"filter_damping{name}", 0.3, reach=reach),
         ]
     return free, entries
+
+
+@structure(
+    "PPF",
+    r"PD, and $-\sum_i g_i \omega_i^2/(s^2 + 2 \zeta_i \omega_i s + \omega_i^2) \, M$ (positive position feedback)",
+)
+def _ppf(arm: Arm, Kp: float, modes: int, period: float) -> Built:
+    return _mode_filters(arm, Kp, modes, period, lambda g, w, zeta: polynomial_of(g * w * w))
+
+
+@structure(
+    "rate+resonant",
+    r"PD, and $-\sum_i g_i \, 2 \zeta_i \omega_i s/(s^2 + 2 \zeta_i \omega_i s + \omega_i^2) \, M$ (resonant feedback)",
+)
+def _rate_resonant(arm: Arm, Kp: float, modes: int, period: float) -> Built:
+    return _mode_filters(arm, Kp, modes, period, lambda g, w, zeta: polynomial_of(2 * g * zeta * w, 0.0))
 
 
 @structure("strain-rate", r"PD, and $-g s/(1 + s/p) \, M$")
@@ -407,3 +444,31 @@ def _strain_rate(arm: Arm, Kp: float, modes: int, period: float) -> Built:
 
     gain = signed_coefficient("gain_s", 0.1 * arm.input_per_torque / first_frequency(arm))
     return (_rate_gain(arm, Kp), gain, _pole(period)), entries
+
+
+@structure(
+    "LQG",
+    r"$v = -K \hat x - k \int \theta \, dt$: observer with state feedback of least "
+    r"$\int (K_p \theta)^2 + (w M)^2 + (K_i \int \theta)^2 + v^2 \, dt$",
+)
+def _lqg(arm: Arm, Kp: float, modes: int, period: float) -> Built:
+    """Return LQG of few modes; a rigid arm's observer of the angle alone would have the speed `observer_rad_s`."""
+    signals = ("hub_angle", "root_moment")
+    plant = held_model(arm, signals, modes, period)
+    J = turning_inertia(arm)
+
+    def entries(Kp: Any, c: Real) -> tuple[Entry, ...]:
+        Ki, weight, speed, noise = c
+        K, k = integral_feedback(plant, np.array([Kp + 0 * weight, weight]), Ki)
+        L = filter_gain(plant, np.array([1 / (J * speed**2), noise]))
+        laws = observer_law(plant, K, k, L)
+        return tuple(Entry(name, *law) for name, law in zip(signals, laws, strict=True))
+
+    unit = arm.input_per_torque
+    free = (
+        _integral_gain(arm, Kp),
+        positive_coefficient("moment_weight", 0.3 * unit),
+        positive_coefficient("observer_rad_s", min(first_frequency(arm), 1 / period)),
+        positive_coefficient("moment_noise", 1 / unit),
+    )
+    return free, entries

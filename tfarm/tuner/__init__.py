@@ -8,15 +8,14 @@ baselines  best constant gain, input shaping and the linear-quadratic bound
 tuning     guard, training and baselines in one call, and their record
 """
 
+from tfarm.dsp.shaping import extra_insensitive, zero_vibration
 from tfarm.tuner.baselines import (
     BestConstant,
     best_constant,
     compare_controllers,
-    extra_insensitive,
     lq_bound,
     shaped_trial,
     tried_loops,
-    zero_vibration,
 )
 from tfarm.tuner.guard import Guard, find_guard
 from tfarm.tuner.kernel import Network, initial_network

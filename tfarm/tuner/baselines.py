@@ -8,16 +8,8 @@ with r (feedforward not counted in u) and m (reference of the moment) known befo
 samples is s^T P s/2 + q^T s + a constant, and e_k = -(B^T P (A s + B r) + B^T q)/(T b + B^T P B).  It bounds
 every e(t), for this arm, slew, sampling and cost, for any network, gain or law.
 
-*Input shaping* is on the exact sampled poles of the loop.  The reference is passed through a few impulses whose sum
-vanishes at the poles z of the modes that are not to be excited (Singer and Seering, 1990).  On the sample grid a
-zero-vibration shaper (ZV) has three impulses: now, n and n + 1 samples later, with n the whole samples of half
-a period:
-
-    c_0 + c_n z^-n + c_{n+1} z^-(n+1) = 0,   c_0 + c_n + c_{n+1} = 1
-
-exactly zero for that mode of the linear loop, for any period.  The extra-insensitive one (EI; Singhose, Seering and
-Singer, 1994) leaves a share V of the vibration at the mode itself, and is zero at two frequencies next to it,
-w (1 +- d) with cos(pi d) = (1 - V)/(1 + V): two ZV shapers in a row.
+*Input shaping* is that of `tfarm.dsp.shaping`, ZV and EI, at the exact sampled poles of the loop without moment
+feedback.
 
 The tuner is compared with no moment feedback, the best constant gain, input shaping, and the linear-quadratic optimum;
 with converters and delay, on the arm of the training and on others.
@@ -26,20 +18,19 @@ Feedforward, references, shapers, gains and weights of every controller are thos
 moving arm.
 """
 
-import math
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from tfarm.arm import MOMENT_GAIN, Arm
-from tfarm.arm.chain import TIME_ROUNDING
 from tfarm.arrays import Real
 from tfarm.case import Case
-from tfarm.dsp import Chain, Converters, Scenario, Simulation
+from tfarm.dsp import Chain, Converters, Simulation
 from tfarm.dsp.scenarios import torque_unit
+from tfarm.dsp.shaping import impulses_at, loop_modes
 from tfarm.errors import ConvergenceError
 from tfarm.loop.sampled import Sampled
 from tfarm.schema import Quantity
@@ -118,52 +109,13 @@ def lq_bound(trial: Trial) -> Record:
     return Record(trial.task.t, x, e, e, np.zeros(n), at_samples @ model.own, cost, None)
 
 
-def zero_vibration(z: complex) -> Real:
-    """Return the impulses (n + 2,) of the shaper with zeros at z and its conjugate, 0 < arg z < pi."""
-    n = max(1, math.floor(math.pi / abs(np.angle(z)) * (1 + TIME_ROUNDING)))
-    at = np.array([0, n, n + 1])
-    powers = z ** (-at.astype(float))
-    shares = np.linalg.solve(np.array([powers.real, powers.imag, np.ones(3)]), [0.0, 0.0, 1.0])
-    impulses = np.zeros(n + 2)
-    impulses[at] = shares
-    return impulses
-
-
-def extra_insensitive(z: complex) -> Real:
-    """Return the impulses of two such shapers in a row, next to the frequency of z."""
-    # V, the share of the vibration that is left at the mode itself, is that of its authors
-    V = 0.05
-    d = math.acos((1 - V) / (1 + V)) / math.pi
-    # in rad a sample, below pi
-    turns = (min(float(np.angle(z)) * factor, 0.999 * math.pi) for factor in (1 - d, 1 + d))
-    first, second = (zero_vibration(complex(abs(z) * np.exp(1j * turn))) for turn in turns)
-    return np.convolve(first, second)
-
-
 def shaper(loop: Sampled, kind: Shaper, modes: int = 2) -> Real:
     """Return the impulses for the first modes below half the sample rate, at poles without moment feedback.
 
     By default for those two that a slew excites most.
     """
-    impulses = np.ones(1)
-    plant = loop.plant
-    build = zero_vibration if kind == "ZV" else extra_insensitive
-    poles: Any = loop.having(MOMENT_GAIN, 0.0).poles
-    for mode in range(1, modes + 1):
-        own = plant.poles[(plant.mode == mode) & (plant.poles.imag > 0)]
-        upper = poles.z[(poles.mode == mode) & (poles.z.imag > 0)]
-        if own.size and upper.size and own[0].imag * loop.chain.sampling.period < math.pi:
-            impulses = np.convolve(impulses, build(complex(upper[0])))
-    return impulses
-
-
-def shape_scenario(task: Scenario, impulses: Real) -> Scenario:
-    """Return the scenario with every reference passed through the impulses; its slew ends later by their length."""
-    names = ("feedforward", "hub_angle", "hub_rate", "rigid_moment")
-    through: dict[str, Any] = {
-        name: np.convolve(getattr(task, name), impulses)[: task.t.size] for name in names
-    }
-    return replace(task, busy_until=task.busy_until + (impulses.size - 1) * task.period, **through)
+    servo = Case(loop.arm, loop.gains.having(MOMENT_GAIN, 0.0), loop.chain)
+    return impulses_at(loop_modes(servo, loop.plant.count), kind, modes)
 
 
 def shaped_trial(trial: Trial, kind: Shaper) -> Trial:
@@ -172,7 +124,7 @@ def shaped_trial(trial: Trial, kind: Shaper) -> Trial:
     x is then the moment less the rigid arm's under the shaped slew, which arrives later.  The linear-quadratic bound of
     the unshaped slew is no bound of it.
     """
-    return replace(trial, task=shape_scenario(trial.task, shaper(trial.loop, kind)))
+    return replace(trial, task=trial.task.through(shaper(trial.loop, kind)))
 
 
 class Outcome(NamedTuple):

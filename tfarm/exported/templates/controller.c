@@ -7,6 +7,10 @@ static const {{ real }} ABCD[{{ n + 1 }}][{{ n + m }}] = { /* of [x; e], to the 
 {% endfor %}
 };
 
+{% if back %}
+static const {{ real }} BACK[{{ n }}] = { {{- back[2:]|join(", ") -}} }; /* back-calculation from a clipped output */
+
+{% endif %}
 {% if fixed %}
 static const unsigned int shifts[{{ n + 1 }}] = { {{- shifts|join("U, ") -}} U};
 
@@ -107,6 +111,18 @@ int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ n
         next[i] = total;
 {% endif %}
     }
+{% if back %}
+    total = next[{{ n }}];
+    total = ((total < {{ back[0] }}) ? {{ back[0] }} : ((total > {{ back[1] }}) ? {{ back[1] }} : total)) - total;
+    if ((total < 0.0{{ suffix }}) || (total > 0.0{{ suffix }})) {
+        for (i = 0; i < {{ n }}; i++) {
+            next[i] += BACK[i] * total;
+            if (is_finite(next[i]) == 0) {
+                return {{ name }}_OVERFLOW;
+            }
+        }
+    }
+{% endif %}
 {% if fixed and step %}
     next[{{ n }}] = shifted(next[{{ n }}], {{ dac[0] }}U) * INT64_C({{ 2**step }});
 {% endif %}

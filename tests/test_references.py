@@ -1,0 +1,269 @@
+"""Profiles by their closed forms, shapers by the textbook, and what both leave of a slew.
+
+The truth of a shaped slew is the simulation; that of impulses are the formulas of Singer and Seering (1990) and of
+Singhose, Seering and Singer (1994), which are of impulses at any time.
+"""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tfarm
+from tests.rigs import some_rig
+from tests.shared import refusal, sized
+from tfarm.case import Case
+from tfarm.dsp import Chain, ReferenceShaping, Sampling, Simulator, Slew, scenario
+from tfarm.dsp.profiles import motion_of_slew
+from tfarm.dsp.scenarios import slew_scenario
+from tfarm.dsp.shaping import (
+    BUILDERS,
+    extra_insensitive,
+    impulses_of,
+    loop_modes,
+    share_left,
+    zero_vibration,
+    zero_vibration_and_slope,
+)
+from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.loop.sampled import sampled_loop
+from tfarm.references import reference
+from tfarm.references.shaped import residual_bound, with_frequencies
+
+LAB = tfarm.load("sasaki2012-lab")
+LAW = tfarm.HubFeedback(K1=0.5, K2=0.1, Kp=2.0)
+POLES = [0.999 * np.exp(0.3j), 0.97 * np.exp(0.71j), np.exp(1j * math.pi / 4), 0.9 * np.exp(2.04j)]
+
+
+def shaped(shaper="none", profile="bang-bang", modes=2, period=0.01, **more):
+    own = ReferenceShaping(shaper=shaper, profile=profile, modes=modes, **more)
+    return Chain(sampling=Sampling(period=period), slew=Slew(travel=0.8, rise_time=0.7), reference=own)
+
+
+# ------------------------------------------------------------ impulses
+
+
+@pytest.mark.parametrize("z", POLES)
+def test_zero_vibration_is_zero_at_the_pole(z):
+    impulses = zero_vibration(z)
+    assert impulses.sum() == pytest.approx(1, rel=1e-14)
+    assert max(share_left(impulses, z), share_left(impulses, z.conjugate())) < 1e-14
+    assert impulses.size == math.floor(math.pi / abs(np.angle(z)) * (1 + 1e-12)) + 2
+
+
+def test_impulses_on_the_grid_are_those_of_the_textbook():
+    """Half a period of 4 samples, k = e^{-zeta pi/sqrt(1 - zeta^2)}: ZV [1, k]/(1 + k), ZVD [1, 2k, k^2]/(1 + k)^2."""
+    z = 0.98 * np.exp(1j * math.pi / 4)
+    k = abs(z) ** 4
+    np.testing.assert_allclose(zero_vibration(z), [1 / (1 + k), 0, 0, 0, k / (1 + k), 0], atol=1e-15)
+    zvd = np.zeros(11)
+    zvd[[0, 4, 8]] = np.array([1.0, 2 * k, k**2]) / (1 + k) ** 2
+    np.testing.assert_allclose(zero_vibration_and_slope(z), zvd, atol=1e-15)
+
+
+def test_extra_insensitive_tolerates_a_share_at_the_mode():
+    """Undamped: [(1 + V)/4, (1 - V)/2, (1 + V)/4] at 0, half and whole the period, and at most V between its zeros."""
+    w = math.pi / 40
+    textbook = np.zeros(82)
+    textbook[[0, 40, 80]] = [1.05 / 4, 0.95 / 2, 1.05 / 4]
+    np.testing.assert_allclose(extra_insensitive(np.exp(1j * w)), textbook, atol=1e-12)
+    impulses = extra_insensitive(np.exp(1j * w / 1.01))
+    band = [share_left(impulses, np.exp(1j * w / 1.01 * f)) for f in np.linspace(0.81, 1.19, 51)]
+    zv = [share_left(zero_vibration(np.exp(1j * w)), np.exp(1j * w * f)) for f in (0.81, 1.19)]
+    assert max(band) < 0.055 < min(zv) / 4
+    assert band[25] == pytest.approx(0.05, rel=0.02)
+
+
+@pytest.mark.parametrize("f", [0.1, 0.37, 0.5, 0.9])
+def test_two_impulses_on_samples_stand_for_one_between_them(f):
+    """Undamped, half a period n + f: sum 1/2 and mean n + f of the impulse of the textbook, both to O(1/n^2)."""
+    n = 40
+    impulses = zero_vibration(np.exp(1j * math.pi / (n + f)))
+    late = impulses[n:]
+    assert late.sum() == pytest.approx(0.5, abs=2 / n**2)
+    assert late @ (n + np.arange(2)) / late.sum() == pytest.approx(n + f, abs=0.05)
+
+
+# ------------------------------------------------------------ profiles
+
+
+PEAKS = {"bang-bang": 4.0, "s-curve": 8.0, "polynomial": 10 / math.sqrt(3)}
+
+
+@pytest.mark.parametrize("profile", PEAKS)
+def test_a_profile_goes_from_rest_to_rest_with_its_peak_acceleration(profile):
+    """The largest acceleration is 4, 8 and 10/sqrt(3) travels over the square of the rise time, the rate symmetric."""
+    chain = shaped(profile=profile)
+    t = np.linspace(0.0, 0.7, 7001)
+    rate, mean = motion_of_slew(chain, 2.0, t)
+    turn = 0.4
+    assert mean @ np.diff(t) == pytest.approx(turn, rel=1e-12)
+    assert abs(rate[[0, -1]]).max() < 1e-12
+    np.testing.assert_allclose(rate, rate[::-1], atol=1e-12)
+    np.testing.assert_allclose(np.r_[0.0, np.cumsum(np.diff(t) * (rate[1:] + rate[:-1]) / 2)][-1], turn, rtol=1e-6)
+    assert abs(np.diff(rate) / np.diff(t)).max() == pytest.approx(PEAKS[profile] * turn / 0.49, rel=1e-3)
+
+
+def test_a_file_of_the_polynomial_is_the_polynomial(tmp_path):
+    """Of 201 points, in milliseconds and degrees, found from the folder of the TOML file."""
+    x = np.linspace(0, 1, 201)
+    rows = [f"{700 * a + 50!r},{33 * a**3 * (10 - 15 * a + 6 * a**2) - 4!r}" for a in x.tolist()]
+    (tmp_path / "own.csv").write_text("\n".join(["t,angle", *rows]))
+    file = tmp_path / "chain.toml"
+    file.write_text('[slew]\ntravel = 0.8\nrise_time = 0.7\n[reference]\nprofile = "file"\nfile = "own.csv"\n')
+    task = slew_scenario(LAB, tfarm.dsp.load_chain(file), 1.0)
+    truth = slew_scenario(LAB, shaped(profile="polynomial"), 1.0)
+    assert abs(task.hub_angle - truth.hub_angle).max() < 1e-7
+    assert abs(task.feedforward - truth.feedforward).max() < 1e-3 * abs(truth.feedforward).max()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("t,a\n0,0\n1,x\n", "a comma between them"),
+        ("t,a\n0,0\n1,1\n", "at least four"),
+        ("t,a\n0,0\n1,1\n1,2\n2,3\n", "times that increase"),
+        ("t,a\n0,0\n1,1\n2,2\n3,0\n", "another angle"),
+        ("", "a comma between them"),
+    ],
+)
+def test_a_wrong_file_of_a_profile_has_its_line(tmp_path, text, words):
+    (tmp_path / "own.csv").write_text(text)
+    chain = shaped(profile="file", file=str(tmp_path / "own.csv"))
+    assert words in str(refusal(slew_scenario, LAB, chain, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("table", "key"),
+    [
+        ({"profile": "cubic"}, "reference.profile"),
+        ({"shaper": "zv"}, "reference.shaper"),
+        ({"modes": 0}, "reference.modes"),
+        ({"profile": "file"}, "reference.file"),
+        ({"file": "own.csv"}, "reference.file"),
+    ],
+)
+def test_a_wrong_reference_has_its_line(table, key):
+    assert refusal(ReferenceShaping, **table).key == key
+
+
+def test_a_shaper_without_a_law_is_refused():
+    assert refusal(scenario, "slew", LAB, shaped("ZV"), 1.0).key == "reference.shaper"
+
+
+# ------------------------------------------------------------ loops
+
+
+def some_loop(rng):
+    """A turning rig at a period of some 30 to 60 samples in that of its first mode, lightly fed back."""
+    while True:
+        arm = some_rig(rng, damped=True, segments=int(rng.integers(1, 3)), drive="hub_torque")
+        if not arm.has_rigid_mode or not arm.hub.inertia or math.isinf(arm.payload.mass):
+            continue
+        try:
+            w = float(tfarm.modes(arm, 1).natural_frequency[-1])
+            usual = tfarm.default_gains(arm)
+        except (ParameterError, ConvergenceError):
+            continue
+        law = tfarm.HubFeedback(K1=usual.K1 * 10 ** rng.uniform(-1, 1), K2=0.0, Kp=usual.K1 * w * rng.uniform(0, 0.02))
+        period = float(f"{2 * math.pi / w / rng.uniform(30, 60):.3g}")
+        chain = replace(
+            shaped(period=period),
+            slew=Slew(travel=1e-3 * arm.reach, rise_time=float(f"{2 * math.pi / w * rng.uniform(1, 4):.3g}")),
+        )
+        if sampled_loop(Case(arm, law, chain)).is_stable:
+            return arm, law, chain
+
+
+def test_the_poles_of_the_modes_are_those_of_the_sampled_loop():
+    for law in (LAW, tfarm.HubFeedback(K1=3.0, K2=0.15), tfarm.HubFeedback(K1=0.3)):
+        poles = sampled_loop(Case(LAB, law)).poles.z
+        found = loop_modes(Case(LAB, law))
+        assert sorted(found) == [1, 2]
+        assert all(abs(poles - z).min() < 1e-12 for z in found.values())
+
+
+@pytest.mark.parametrize("kind", BUILDERS)
+def test_a_one_mode_loop_is_left_at_rest_or_with_the_share_of_its_shaper(kind):
+    """Without damping and controller the vibration of a model of one mode is the share of the impulses."""
+    arm = tfarm.load("sasaki2012")
+    case = Case(arm, tfarm.HubFeedback(), shaped(kind, modes=1))
+    task = scenario("slew", arm, case.chain, 4.0, case.law)
+    plain = slew_scenario(arm, case.chain, 4.0)
+    rests = [Simulator(case, each, count=1).run().at_samples.root_moment[each.t > 1.2] for each in (task, plain)]
+    (z,) = loop_modes(case, count=1).values()
+    share = share_left(impulses_of(arm, case.chain, case.law), z)
+    sizes = [np.sqrt(np.mean(each**2)) for each in rests]
+    assert sizes[0] == pytest.approx(share * sizes[1], rel=0.02, abs=1e-10)
+    assert (share < 1e-12) == (kind != "EI")
+
+
+def test_the_frequencies_of_an_arm_with_an_error_are_scaled():
+    own = tfarm.modes(LAB, 4).natural_frequency
+    np.testing.assert_allclose(tfarm.modes(with_frequencies(LAB, 1.2), 4).natural_frequency, 1.2 * own, rtol=1e-9)
+
+
+@pytest.mark.parametrize("number", sized(8, 200))
+def test_the_residual_of_a_shaped_slew_is_within_its_bound(number):
+    """On random rigs, at every sample from the end on, by the simulation; and the bound is not far from it."""
+    rng = np.random.default_rng(5)
+    profiles = ("bang-bang", "s-curve", "polynomial")
+    ratios = []
+    for n in range(number):
+        arm, law, chain = some_loop(rng)
+        shaping = ReferenceShaping(shaper=[*BUILDERS][n % 3], profile=profiles[n // 3 % 3])
+        case = Case(arm, law, replace(chain, reference=shaping))
+        end = chain.slew.rise_time + 400 * chain.sampling.period
+        task = scenario("slew", arm, case.chain, end, law)
+        bound = residual_bound(case, task, 12)
+        moment = Simulator(case, task, count=12).run().at_samples.root_moment
+        left = abs(task.residual(moment)).max()
+        # of eigenvectors that are nearly parallel there is none
+        if bound is None:
+            continue
+        assert left <= bound * (1 + 1e-6) + 1e-9 * abs(moment).max()
+        ratios.append(bound / left)
+    assert np.median(ratios) < 5
+    assert len(ratios) >= 0.95 * number
+
+
+def test_a_shaper_leaves_less_over_the_error_of_the_frequency():
+    """ZVD less than ZV, both less than none; the curve at 0 is the residual of `simulate` over as long a record."""
+    found = {kind: reference(LAB, LAW, shaped(kind)) for kind in ("none", "ZV", "ZVD")}
+    assert found["none"].worst_share == 1.0
+    near = abs(found["ZV"].errors) < 0.11
+    zv, zvd = (found[kind].residuals[near] / found[kind].unshaped_residuals[near] for kind in ("ZV", "ZVD"))
+    assert (zvd < zv).all()
+    assert zv.max() < 0.25
+    each = found["ZV"]
+    run = tfarm.simulate(LAB, LAW, shaped("ZV"), "slew", float(each.nominal.t[-1]))
+    assert run.residual_moment == pytest.approx(each.residual, rel=1e-9)
+    assert run.scenario.busy_until == pytest.approx(each.rise_time + each.added)
+
+
+def test_a_step_of_a_shaped_slew_is_the_simulation():
+    found = tfarm.step(LAB, LAW, shaped("ZV"), "slew", 2.0)
+    run = tfarm.simulate(LAB, LAW, shaped("ZV"), "slew", 2.0)
+    assert found.continuous is None
+    every = round(found.period / found.t[1])
+    np.testing.assert_allclose(found.sampled.signals["root_moment"][::every], run.at_samples.root_moment, atol=1e-9)
+
+
+def test_the_continuous_time_response_to_an_s_curve_is_near_that_of_fast_samples():
+    found = tfarm.step(LAB, LAW, shaped(profile="s-curve", period=0.002), "slew", 1.5)
+    for name in ("hub_angle", "tip_displacement", "root_moment"):
+        y, held = found.continuous.signals[name], found.sampled.signals[name]
+        assert abs(y - held[: y.size]).max() < 0.01 * abs(held).max()
+
+
+def test_the_command_is_the_function(capsys):
+    from tfarm.cli.running import run
+
+    assert run(["reference", "sasaki2012-lab", "--K1", "0.5", "--shaper", "EI", "--modes", "1", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    law = replace(tfarm.default_gains(LAB), K1=0.5)
+    truth = reference(LAB, law, Chain(reference=ReferenceShaping(shaper="EI", modes=1)))
+    assert found["residual_moment_rms"] == truth.residual
+    assert [each["is_shaped"] for each in found["modes"]] == [True, False]

@@ -1,0 +1,269 @@
+"""The reference of a slew in numbers: its impulses, the modes that it is shaped for, and the vibration that it leaves.
+
+The frequency error e is one of the whole arm: moduli of every link and stiffnesses of clamp and joint times (1 + e)^2,
+so that each frequency of the arm alone is (1 + e) times its own, but for rotary damping.  Controller, references and
+impulses stay those of the nominal arm.  The loop is sampled, with its converters.
+
+After the slew the root moment of the linear loop is a sum over its poles of amplitude times z^k, so that
+
+    |M_k| <= sum over poles of |moment v_i| |w_i x_N|,   v_i, w_i the right and left eigenvectors
+
+at every sample after the end N, where the references are constant.  With the value at N itself that is a bound on the
+residual for the modes of the model; the modes left out are not in it.
+"""
+
+import math
+from dataclasses import replace
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from tfarm.arm import AnyLaw, Arm
+from tfarm.arm.chain import Chain
+from tfarm.arm.checks import number
+from tfarm.arrays import Real
+from tfarm.case import Case
+from tfarm.dsp import kernel
+from tfarm.dsp.results import simulate_modes
+from tfarm.dsp.scenarios import Scenario, slew_scenario
+from tfarm.dsp.shaping import impulses_at, loop_matrix, loop_modes, share_left
+from tfarm.dsp.simulate import Simulator
+from tfarm.dsp.stages import admit_case
+from tfarm.errors import ConvergenceError, require
+from tfarm.records import frozen
+from tfarm.response.signals import ControllerSignals, controller
+from tfarm.schema import Column, Percent, Quantity, Table
+from tfarm.spectrum.table import first_frequency
+
+
+class Impulse(NamedTuple):
+    """An impulse of a shaper."""
+
+    time: Annotated[float, Quantity("time", "s", digits=6, help="after the begin of the slew")]
+    size: Annotated[float, Quantity("size", "", 6, help="share of the reference; all together are 1")]
+
+
+class ShapedMode(NamedTuple):
+    """A mode of the loop, and what its impulses leave of its vibration."""
+
+    mode: Annotated[int, Quantity("mode", help="number of the flexible mode")]
+    frequency: Annotated[
+        float, Quantity("frequency", "Hz", 5, help="|s|/(2 pi) of the pole of the sampled loop")
+    ]
+    damping_ratio: Annotated[float, Quantity("damping ratio", "", 4, help="-Re s/|s| of that pole")]
+    is_shaped: Annotated[bool, Quantity("shaped", help="whether the shaper has a zero at or next to it")]
+    share: Annotated[Percent, Quantity("share left", digits=3, help="of its vibration, by the impulses")]
+    tolerance: Annotated[
+        Percent | None,
+        Quantity(
+            "tolerance", digits=3, help="frequency error up to which at most 5 % are left, on both sides"
+        ),
+    ]
+
+
+@frozen
+class ShapedReference:
+    """The reference of a slew: impulses, modes, and the residual root moment over the error of the frequency.
+
+    `residual` and `unshaped` are rms [N m] over equally long records from the end of each slew on.
+    """
+
+    controller: Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]
+    profile: Annotated[str, Quantity("profile", help="of the slew before the shaper")]
+    shaper: Annotated[str, Quantity("shaper", help="none, ZV, ZVD or EI")]
+    rise_time: Annotated[float, Quantity("rise time", "s", 4, help="of the profile")]
+    added: Annotated[float, Quantity("time added by the shaper", "s", 4, help="until its last impulse")]
+    impulses: Annotated[tuple[Impulse, ...], Quantity("impulses", help="of the shaper, all modes together")]
+    modes: Annotated[
+        tuple[ShapedMode, ...], Quantity("modes of the loop", help="below half the sampling rate")
+    ]
+    residual: Annotated[
+        float,
+        Quantity(
+            "residual root moment",
+            "N m rms",
+            4,
+            key="residual_moment_rms",
+            help="after the slew, less the rigid arm's",
+        ),
+    ]
+    unshaped: Annotated[
+        float,
+        Quantity(
+            "the same without shaper", "N m rms", 4, key="unshaped_moment_rms", help="of the profile alone"
+        ),
+    ]
+    bound: Annotated[
+        float | None,
+        Quantity(
+            "bound on the residual at the samples",
+            "N m",
+            4,
+            key="residual_moment_bound",
+            help="sum of the amplitudes of all modes of the model; null of a loop that is not linear or not stable",
+        ),
+    ]
+    modes_used: Annotated[
+        int, Quantity("modes of the model", help="flexible modes of the arm in the simulation")
+    ]
+    errors: Annotated[
+        Real, Quantity("frequency error", curve=True, help="share of each frequency of the arm")
+    ]
+    residuals: Annotated[Real, Quantity("residual", "N m rms", curve=True, help="with the shaper")]
+    unshaped_residuals: Annotated[
+        Real, Quantity("without shaper", "N m rms", curve=True, help="of the profile")
+    ]
+    nominal: Scenario
+    plain: Scenario
+
+    @property
+    def worst_share(
+        self,
+    ) -> Annotated[
+        Percent,
+        Quantity("largest share left", digits=3, help="of the residual of the profile, over the curve"),
+    ]:
+        """The largest ratio of both residuals over the frequency error."""
+        return Percent(float((self.residuals / self.unshaped_residuals).max()))
+
+    @property
+    def csv_table(self) -> Table:
+        """Both residuals over the error of the frequency."""
+        columns = (
+            Column("frequency_error", of=self.errors),
+            Column("residual", unit="N m rms", of=self.residuals),
+            Column("unshaped_residual", unit="N m rms", of=self.unshaped_residuals),
+        )
+        return Table(columns=columns)
+
+
+def reference(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, error: float = 0.3) -> ShapedReference:
+    """Return impulses, modes and residual vibration of the slew of a chain, over frequency errors up to `error`.
+
+    Parameters
+    ----------
+    arm, law, chain
+        The loop; the chain has the slew and its reference, bang-bang without a shaper unless given.
+    error
+        Largest error of the frequencies, as a share.
+
+    Raises
+    ------
+    ParameterError
+        As `simulate` does, for a loop whose simulation stops, and for an error outside (0, 0.9].
+    """
+    remedy = "the largest error of the frequencies is a share up to 0.9, such as 0.3"
+    require(0 < number("error", error, remedy) <= 0.9, "error", error, remedy)
+    case = admit_case(kernel.CONSUMER, Case(arm, law, chain))
+    chain = case.chain
+    shaping = chain.reference
+    period = chain.sampling.period
+    poles = loop_modes(case)
+    impulses = impulses_at(poles, shaping.shaper, shaping.modes)
+    added = (impulses.size - 1) * period
+    # after the end of each slew
+    left = max(2 * chain.slew.rise_time, 4 * 2 * np.pi / first_frequency(case.arm))
+    plain = slew_scenario(case.arm, chain, chain.slew.rise_time + left)
+    late = slew_scenario(case.arm, chain, chain.slew.rise_time + added + left).through(impulses)
+    _, used = simulate_modes(case, late)
+    errors = np.linspace(-error, error, 25)
+    residuals = [
+        [residual_of(case.on(with_frequencies(case.arm, 1 + e)), task, used.modes) for e in errors.tolist()]
+        for task in (late, plain)
+    ]
+    middle = errors.size // 2
+    return ShapedReference(
+        controller=controller(case.law, case.arm),
+        profile=shaping.profile,
+        shaper=shaping.shaper,
+        rise_time=chain.slew.rise_time,
+        added=added,
+        impulses=tuple(Impulse(k * period, float(impulses[k])) for k in np.flatnonzero(impulses).tolist()),
+        modes=tuple(shaped_mode(mode, z, impulses, case) for mode, z in poles.items()),
+        residual=residuals[0][middle],
+        unshaped=residuals[1][middle],
+        bound=residual_bound(case, late, used.modes),
+        modes_used=used.modes,
+        errors=errors,
+        residuals=np.array(residuals[0]),
+        unshaped_residuals=np.array(residuals[1]),
+        nominal=late,
+        plain=plain,
+    )
+
+
+def with_frequencies(arm: Arm, factor: float) -> Arm:
+    """Return the arm with moduli and stiffnesses times factor^2: its frequencies are `factor` times its own."""
+    links = [
+        replace(
+            link, youngs_modulus=factor**2 * link.youngs_modulus, shear_modulus=factor**2 * link.shear_modulus
+        )
+        for link in (arm.link, *arm.outer)
+    ]
+    clamp, joint = (replace(each, stiffness=factor**2 * each.stiffness) for each in (arm.clamp, arm.joint))
+    return replace(arm, link=links[0], outer=tuple(links[1:]), clamp=clamp, joint=joint)
+
+
+def residual_of(case: Case, task: Scenario, count: int) -> float:
+    """Return the rms of the residual root moment [N m].  Raises ConvergenceError where the simulation stops."""
+    found = Simulator(case, task, count=count).run().residual_moment
+    if found is None:
+        raise ConvergenceError(
+            "the loop grows at a frequency within the error: no residual", case.arm, math.inf
+        )
+    return found
+
+
+def shaped_mode(mode: int, z: complex, impulses: Real, case: Case) -> ShapedMode:
+    """Return the row of a mode with the pole z of the sampled loop."""
+    period = case.chain.sampling.period
+    s = complex(np.log(z)) / period
+    reference = case.chain.reference
+    is_shaped = reference.shaper != "none" and mode <= reference.modes
+    # the frequency alone changes, and the damping with it as a ratio
+    errors = np.linspace(0.0, 0.9, 901)
+    shares = np.maximum(*(share_left(impulses, np.exp(s * (1 + way * errors) * period)) for way in (1, -1)))
+    # of the vibration that is tolerated, as usual
+    (beyond,) = np.nonzero(shares > 0.05 * (1 + 1e-6))
+    first = int(beyond[0]) if beyond.size else errors.size
+    return ShapedMode(
+        mode,
+        abs(s) / (2 * np.pi),
+        -s.real / abs(s),
+        is_shaped,
+        Percent(float(share_left(impulses, z))),
+        Percent(float(errors[first - 1])) if is_shaped and first else None,
+    )
+
+
+def residual_bound(case: Case, task: Scenario, count: int) -> float | None:
+    """Return the bound on the residual root moment at the samples after a slew [N m]; None where there is none.
+
+    That is a loop that is not linear or not stable, one of an estimated hub rate, and eigenvectors that are nearly
+    parallel.
+    """
+    law = case.feedback
+    loop = loop_matrix(case, count)
+    is_covered = case.chain.is_linear and case.chain.converters.hub_rate == "ideal" and not law.wanted
+    if not is_covered:
+        return None
+    zero = np.zeros(task.t.size)
+    own = {name: task.references[name] for name in law.references}
+    references = np.array([own.get(name, zero) for name in loop.in_z.signals])
+    forcing = np.outer(loop.push, task.feedforward + loop.through @ references) - loop.read @ references
+    M = loop.under(1.0)
+    x = np.zeros(len(M))
+    end = int(task.is_after.argmax())
+    for k in range(end):
+        x = M @ x + forcing[:, k]
+    first = float(abs(loop.moment @ x - task.rigid_moment[end]))
+    x = M @ x + forcing[:, end]
+    # the state of rest under the constant references; that of an angle without feedback may be any
+    rest = np.linalg.lstsq(np.eye(len(M)) - M, forcing[:, -1], rcond=None)[0]
+    z, V = np.linalg.eig(M)
+    # 1e-9: rounding of a pole at 1
+    if abs(z).max() > 1 + 1e-9 or np.linalg.cond(V) > 1e12:
+        return None
+    amplitudes = (loop.moment @ V) * np.linalg.solve(V, (x - rest).astype(complex))
+    still = float(abs(loop.moment @ rest))
+    return max(first, still + float(abs(amplitudes).sum()))
