@@ -9,6 +9,7 @@ from scipy import stats
 
 import tfarm
 from tests.shared import refusal
+from tests.shell import answer, refused
 from tests.synthesis.held_loop import HeldLoop
 from tfarm.dsp import Chain
 from tfarm.fitting.posterior import Posterior, PosteriorNumber
@@ -161,3 +162,30 @@ def test_arms_of_the_file_of_a_study_with_its_posterior(tmp_path):
 )
 def test_what_no_law_is_designed_for_is_refused_in_one_line(over, fresh, words):
     assert words in str(refusal(drawn_arms, LAB, over, fresh=fresh))
+
+
+@pytest.mark.survey
+def test_the_command_has_the_share_of_the_arms_of_a_study(capsys, tmp_path):
+    (tmp_path / "study.toml").write_text('arm = "sasaki2012-lab"\n[over]\n"payload.mass" = {uniform = [0.0, 0.05]}\n')
+    shown = answer(capsys, "design", "sasaki2012-lab", "--study", str(tmp_path / "study.toml"), "--fresh", "3")
+    fresh = shown["verification"]
+    assert (fresh["source"], fresh["arms"]) == ("study.toml", 3)
+    drawn = drawn_arms(LAB, tmp_path / "study.toml", fresh=3)
+    law = tfarm.HubFeedback(**{row["name"]: row["value"] for row in shown["coefficients"]})
+    card = studied(tmp_path, drawn.fresh, law)
+    assert fresh["met"] == np.sum(is_good(card, "sampled") & is_good(card, "continuous"))
+    assert [row["requirement"] for row in fresh["margins"]] == ["GM>=6", "PM>=45", "delay>=1", "Ms<=2"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--objective", "margin"], "requirements hold on arms of a study or posterior"),
+        (["--range", "payload.mass=0.1,0.2"], "has its own ranges"),
+        (["--trade-off"], "the front is of given arms"),
+        (["--fresh", "0"], "a whole number from 1"),
+    ],
+)
+def test_options_that_exclude_an_ensemble_are_refused(capsys, tmp_path, options, words):
+    (tmp_path / "study.toml").write_text('arm = "sasaki2012-lab"\n[over]\n"payload.mass" = {uniform = [0.0, 0.05]}\n')
+    assert words in refused(capsys, "design", "sasaki2012-lab", "--study", str(tmp_path / "study.toml"), *options)
