@@ -1,6 +1,8 @@
 """Controller design for the exact arm: best coefficients of a law, for its sampled or its continuous-time loop.
 
-design      the best law of a structure by an objective, with its verdicts and the width of the optimum
+design      the best law of a structure, by requirements or by an objective
+result      the record of a design: law, verdicts, width of the optimum, requirements
+observer    the law of an observer with state feedback
 structures  structures of laws: formula, coefficients with start and bounds, and law of each
 judge       objectives, and scores of laws in a loop of few modes
 models      loops of few modes under many laws at once, and slews in them
