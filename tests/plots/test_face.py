@@ -92,6 +92,7 @@ def records(tmp_path_factory):
         "slew": lambda: [LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)],
         **dict.fromkeys(("study", "study_band", "study_scatter"), lambda: [study()]),
         "step": lambda: [tfarm.step(LAB, LAW, scenario_name="slew", duration=2.0)],
+        "trade_off": lambda: [tfarm.trade_off(LAB, number=2)],
         "reference": lambda: [tfarm.reference(LAB, LAW, Chain(reference=ReferenceShaping(shaper="ZV")))],
         "locus of a law": lambda: [tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 10, 3)],
         "gain_map of a law": lambda: [tfarm.map(LAB, factors, delays, law=LEAD, vary=("gain", "delay"))],

@@ -175,7 +175,7 @@ HELD = [(replace(LAB, payload=tfarm.Payload(**{part: float("inf")})), part) for 
 BAD = [
     *((LAB, {"K1": bounds}, "K1") for bounds in ((1.0, 1.0), (2.0, 1.0), (float("nan"), 1.0), (0.0, float("inf")))),
     *((arm, {"objective": "residual"}, f"payload.{part} = inf: ") for arm, part in HELD),  # no slew to leave one
-    (LAB, {"structure": "LQG"}, "structure"),
+    (LAB, {"structure": "LQX"}, "structure"),
     (LAB, {"structure": "lead", "objective": "beauty"}, "objective"),
     (LAB, {"structure": "lead", "K1": (0.0, 1.0)}, "K1"),
     (LAB, {"structure": "PD", "Kp": -1.0}, "Kp"),

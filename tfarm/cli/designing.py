@@ -378,7 +378,7 @@ def study_arguments(
 
     Raises ParameterError for both.
     """
-    from tfarm.studies.declaration import load_study
+    from tfarm.ensemble.declaration import load_study
 
     # an arm's file names no arm
     if "arm" in file.tables:

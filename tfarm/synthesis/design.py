@@ -52,7 +52,17 @@ from tfarm.synthesis.worst_case import (
 
 CONSUMER = Consumer(
     "design",
-    acts=("reference", "anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
+    acts=(
+        "reference",
+        "shaper",
+        "anti-alias filter",
+        "hub rate",
+        "law",
+        "hold",
+        "delay",
+        "hub damping",
+        "plant",
+    ),
     partly=(
         "encoder",
         "amplifier steps",

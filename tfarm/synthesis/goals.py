@@ -27,6 +27,7 @@ from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.gains import turning_inertia
 from tfarm.spectrum.table import first_frequency
+from tfarm.synthesis.judge import slowest_allowed
 from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.requirements import Requirement
 from tfarm.synthesis.slew_measures import SlewMeasures
@@ -164,14 +165,20 @@ class Goal:
 
 
 def slowness(judge: Any, entries: Sequence[Entry]) -> Real:
-    """Return log(J w^2/abs(C(i w))) of laws, at least 0 (laws,), with C from hub angle to input, at a low frequency w.
+    """Return 10 log(J w^2/abs(C(i w))) of laws, at least 0 (laws,), C from hub angle to input, w of `slowest_allowed`.
 
-    Below one the law is slower than w: without this floor a law of hardly any gain is the best where a vibration decays
-    more slowly than the hub, whatever the law, and for the least Ms or input.
+    Below one the law is slower than w: without this floor a law of hardly any gain is the best for the least Ms or
+    input, and where a vibration decays more slowly than the hub whatever the law.  Of laws that are equal otherwise the
+    faster is better, up to a tenth of the first frequency, or of a radian a sample.
     """
-    # of the first frequency, or of a radian a sample: a little less than the speed of the angle of other designs
-    share = 0.08
-    w = share * min(first_frequency(judge.arm), 1 / judge.chain.sampling.period)
+    period = judge.chain.sampling.period
+    floor = 1 / slowest_allowed(judge.arm, period)
+    usual = 0.1 * min(first_frequency(judge.arm), 1 / period)
+    return 10 * _slower_than(floor, judge, entries) + 0.1 * _slower_than(usual, judge, entries)
+
+
+def _slower_than(w: float, judge: Any, entries: Sequence[Entry]) -> Real:
+    """Return log(J w^2/abs(C(i w))) of laws, at least 0 (laws,)."""
     s = 1j * w
     from_angle = {"hub_angle": 1.0, "hub_rate": s}
     gain: Any = np.zeros(1)
