@@ -33,6 +33,7 @@ from tfarm.report import live
 from tfarm.schema import to_dict
 from tfarm.synthesis import design
 from tfarm.synthesis.judge import judge_of
+from tfarm.synthesis.slew_measures import SlewMeasures
 from tfarm.tuner import kernel as tuner
 from tfarm.tuner.guard import sector_guard
 from tfarm.tuner.trial import to_text
@@ -87,8 +88,10 @@ def designed(arm, chain):
     """What a design is judged by: its objectives, and the verdict that is printed with it."""
     values = [
         judge_of(arm, arm, chain, objective, ("hub_rate", "root_moment"), 2, 8).value(GAINS)
-        for objective in ("damping", "residual")
+        # a shaper has the impulses of one loop, and these objectives many laws at once
+        for objective in ("damping", "residual")[: 1 if chain.reference.shaper != "none" else 2]
     ]
+    values += SlewMeasures(arm, arm, chain, 8).of(GAINS).values()
     return values, sampled_brief(Case(arm, GAINS, chain)).words
 
 

@@ -17,7 +17,7 @@ OF_AN_ARM = {
     "step": "--duration 1",
     "sampled": "--modes 3",
     "norm": "--weight S=1,1/1,0.1",
-    "reference": "",
+    "reference": "--K1 0.05 --K2 0",
     "simulate": "--scenario decay --duration 0.2 --modes 3",
     "design": "--structure PD --minimise time-constant",
     "export": "--what plant --as py --out OUT",
