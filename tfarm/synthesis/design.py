@@ -37,6 +37,7 @@ from tfarm.synthesis.required import (
 from tfarm.synthesis.requirements import MEASURES, RequirementList, measure_named, requirements_of
 from tfarm.synthesis.result import Design, OnArm
 from tfarm.synthesis.search import Search, Worst, flat_part, search
+from tfarm.synthesis.stability_map import recommended_gains
 from tfarm.synthesis.structures import STRUCTURES, Bounds, Structure, check_bounds, structure_of
 from tfarm.synthesis.trade_off import TradeOff, front
 from tfarm.synthesis.worst_case import (
@@ -163,12 +164,16 @@ def design(
         require_that(box is None, "range", ranges, "a study or posterior has its own ranges: leave these out")
         drawn = drawn_arms(arm, study, posterior, fresh)
         worst = partial(violation_on, search_for)
-    found, named, case = for_the_worst(arms, box or drawn, search_for.find, worst, options.tell)
+    found, named, case = for_the_worst(
+        arms, box or drawn, partial(_find_or_good_gains, search_for), worst, options.tell
+    )
     conflicts: tuple[str, ...] = ()
     alternatives: tuple[str, ...] = ()
     if found.violation > 0:
         conflicts = search_for.conflicts(found, named)
-        others = (replace(search_for, form=each) for each in _other_forms(options))
+        # another structure is out of reach where the link has no damping: a search takes minutes
+        forms = iter(()) if arm.has_elastic_link else _other_forms(options)
+        others = (replace(search_for, form=each) for each in forms)
         alternatives = tuple(islice((each.form.name for each in others if each.meets(named)), 1))
     return replace(
         _record(search_for, found, named, case, is_continuous=False),
@@ -178,6 +183,36 @@ def design(
         conflicts=conflicts,
         alternatives=alternatives,
     )
+
+
+def _find_or_good_gains(
+    task: RequirementTask, named: Sequence[NamedArm], before: RequiredLaw | None, effort: Effort
+) -> RequiredLaw:
+    """Return the law of a search, or of the region of good gains in the map, where that has less violation.
+
+    That region may be a sliver, between whose points a search finds none.
+    """
+    found: RequiredLaw | None = None
+    failure = ConvergenceError("", None, None)
+    try:
+        found = task.find(named, before, effort)
+    except ConvergenceError as error:
+        failure = error
+    form = task.form
+    has_map = (
+        form.name == TWO_GAINS and not form.given and not any(form.fixed.values()) and effort != "sketch"
+    )
+    if has_map and (found is None or found.violation > 0):
+        gains = recommended_gains(named[0].arm, task.chain)
+        if gains is not None:
+            x = np.clip(form.at([*gains.law.point]), *form.box)
+            judges = tuple(task.judge(each.arm, task.goal, 0) for each in named)
+            chosen = task.examine(named, judges, Search(form, [(0.0, x)], 1, 1, ()), x, task.goal)
+            if chosen.violation < (np.inf if found is None else found.violation):
+                found = chosen
+    if found is None:
+        raise failure
+    return found
 
 
 def trade_off(

@@ -56,6 +56,7 @@ class DesignModel:
     higher: tuple[complex, ...]
     last: int
     own_moment: Real
+    least_decay: float = 0.0
 
     # ------------------------------------------------------------ laws in states
 
@@ -123,10 +124,10 @@ class DesignModel:
         return np.linalg.eigvals(found).astype(complex)
 
     def growth(self, poles: Complex) -> Real:
-        """Return ln |z| of poles, or Re s/|s| less the error of the model: below 0 if stable."""
+        """Return ln |z| of poles, more by `least_decay`, or Re s/|s| less the error of the model: below 0 if stable."""
         size = np.maximum(abs(poles), LEAST_SIZE)
         if self.period is not None:
-            return np.log(size)
+            return np.log(size) + self.least_decay
         # a smaller growth may be an error of the model
         return poles.real / size - 1e-6
 

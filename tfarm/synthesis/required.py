@@ -106,7 +106,9 @@ class RequirementTask:
             # the loop of the arm as it is has to be stable
             most = model_sizes(on, self.chain, self.modes, continuous=False)[0]
             own = judge_of(on, self.arm, self.chain, goal, self.form.signals, self.modes, most)
-            found = replace(found, also=(*found.also, own.model, *own.also))
+            # not to its rounding: the search would end where the decay of a mode passes 0
+            stable = replace(own.model, least_decay=1e-9)
+            found = replace(found, also=(*found.also, stable, *own.also))
         sampling = found.chain.sampling
         delays = list(goal.delays)
         for each, shift in zip(self.requirements, goal.shifts[0], strict=True):
@@ -133,7 +135,9 @@ class RequirementTask:
         best: RequiredLaw | None = None
         sizes = [model_sizes(each.arm, self.chain, self.modes, continuous=False) for each in named]
         step = 0
-        for attempt in range(6):
+        # with the large models of undamped arms a search takes a minute
+        attempts = 2 if any(each.arm.has_elastic_link for each in named) else 6
+        for attempt in range(attempts):
             judges = tuple(self.judge(each.arm, goal, step) for each in named)
             found = search(Worst(judges[::-1]), form, self.tell, near, effort if attempt == 0 else "near")
             form = found.form
@@ -143,7 +147,7 @@ class RequirementTask:
             if effort == "sketch":
                 return RequiredLaw(Worst(judges), found, *found.found[0], law, goal, ())
             candidates = (
-                self._examined(named, judges, found, x, goal) for score, x in found.found if score < LOST
+                self.examine(named, judges, found, x, goal) for score, x in found.found if score < LOST
             )
             # the best on the models may be unstable by a mode that they leave out
             chosen = next((each for each in candidates if np.isfinite(each.violation)), None)
@@ -168,13 +172,24 @@ class RequirementTask:
             raise ConvergenceError(why_none(named, form, law, self.chain, max(map(max, sizes))), law, None)
         return best
 
-    def _examined(
+    def examine(
         self, named: Sequence[NamedArm], judges: tuple[Judge, ...], found: Search, x: Real, goal: Goal
     ) -> RequiredLaw:
-        """Return a law that was found, with the exact values of all requirements on each arm."""
-        form = found.form
+        """Return a law that was found, with the exact values of all requirements on each arm.
+
+        For a quantity of the slew it is that of a simplex from there, unless the exact loop of that is unstable.
+        """
         if goal.by_simulation:
-            x = polished(goal, judges, form, x)
+            better = self._exact(named, judges, found, polished(goal, judges, found.form, x), goal)
+            if np.isfinite(better.violation):
+                return better
+        return self._exact(named, judges, found, x, goal)
+
+    def _exact(
+        self, named: Sequence[NamedArm], judges: tuple[Judge, ...], found: Search, x: Real, goal: Goal
+    ) -> RequiredLaw:
+        """Return the law at x with the exact values of all requirements on each arm."""
+        form = found.form
         law = form.record_at(x)
         score = float(Worst(judges).scores(form, x[:, None])[0])
         rows = []
