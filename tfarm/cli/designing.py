@@ -87,7 +87,7 @@ def design(
     study: file of a study: requirements hold on the worst arms of a pool drawn from it
     posterior: posterior of a fit, likewise
     fresh: further arms drawn, on which the law is examined
-    trade_off: the front of speed against robustness instead: 12 designs; --save writes each beside FILE
+    trade_off: the front of speed against robustness instead: 12 designs; --save FILE writes each to FILE-01.toml ...
     continuous: for the continuous-time loop
     also: further arm; the objective is the worst of all; may be repeated
     over: range of a number of the arm, such as payload.mass=0.1,0.5; up to four: corners, and a search inside

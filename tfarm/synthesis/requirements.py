@@ -57,7 +57,7 @@ _NAMES = {word: key for key, each in MEASURES.items() for word in (key, *each.sh
 
 
 class Requirement(NamedTuple):
-    """A limit of a quantity, in its unit; `sense` says which side of it is allowed."""
+    """A limit of a quantity, in its unit; `sense` is the allowed side."""
 
     name: Annotated[str, Quantity("requirement", key="name", help="quantity of the card or of the slew")]
     sense: Annotated[Sense, Quantity(help="side of the limit that is allowed")]
@@ -107,7 +107,7 @@ RequirementList = str | Mapping[str, float | str] | Sequence[Requirement]
 def requirements_of(wanted: RequirementList) -> tuple[Requirement, ...]:
     """Return the requirements of a text, a table, or a sequence of them.
 
-    A text is a list such as "GM>=6, PM>=45, damping>=2%"; "good" stands for the limits of the grade.  A table has a
+    A text is a list such as "GM>=6, PM>=45, damping>=2%"; "good" is the limits of the grade.  A table has a
     limit for each name, {"phase_margin": 45}; its sense is that of a good value.
     Raises ParameterError for an unknown name, a limit that is no finite number, and the sense that is never good.
     """

@@ -1,6 +1,6 @@
 """The front of speed against robustness: laws of least settling time, say, under limits of all strengths.
 
-A robustness of 1 stands for the limits of the grade *good*: gain margin 6 r dB, phase margin 45 r deg, delay margin r
+A robustness of 1 has the limits of the grade *good*: gain margin 6 r dB, phase margin 45 r deg, delay margin r
 periods, and Ms = 1 + 1/r.  A law is sought near that of the robustness before, so that the front has no jumps where the
 optimum has none.
 """
