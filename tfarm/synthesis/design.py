@@ -112,8 +112,8 @@ def design(
     the slew, or the least time constant of an arm that cannot turn.  Quantities of `tfarm.synthesis.requirements` are
     minimised under the requirements `require`, "good" by default, such as "GM>=6, PM>=45, torque<=5" or
     {"phase_margin": 45}: the time constant decides where the tip is at rest when the motion ends.  Where no law meets
-    them all, that with the least violations is returned: `.is_met` is false, `.conflicts` and `.alternatives` what would
-    help.
+    them all, that with the least violations is returned: `.is_met` is false, and `.conflicts` and `.alternatives` have
+    what would help.
 
     Structures are those of `tfarm.synthesis.structures`: "K1-K2", gains of rate and moment, within the bounds `K1` and
     `K2` where given, "PD", "PD+notch" and others; `modes` is the number of filters, `Kp` is chosen where it is 0, but
