@@ -27,12 +27,13 @@ from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum.gains import rate_unit
 from tfarm.spectrum.table import first_frequency
-from tfarm.synthesis.goals import SHARE_OF_SPEED, check, slew_of
+from tfarm.synthesis.goals import SHARE_OF_SPEED, check
 from tfarm.synthesis.judge import LOST
 from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.required import RequirementTask
 from tfarm.synthesis.requirements import GOOD
 from tfarm.synthesis.search import Worst, sobol
+from tfarm.synthesis.slew_measures import SlewMeasures
 from tfarm.synthesis.structures import structure_of
 from tfarm.synthesis.worst_case import NamedArm
 
@@ -131,7 +132,8 @@ class Other:
         self.goal = task.goal
         self.named = NamedArm(task.arm.name, task.arm, {})
         self.judge = task.judge(task.arm, self.goal, 0)
-        self.slew = slew_of(self.judge)
+        self.slew = SlewMeasures(self.judge.arm, self.judge.known, self.judge.chain, 8)
+        self.task = task
         self.form = task.form.wider(task.form.ends(physical=False), 4.0)
         self.share = share
         # the least value of a law that meets the requirements by the exact card, and its point
@@ -157,7 +159,7 @@ class Other:
     def on_card(self, x):
         """Score of a point by its exact cards; the best that meets the requirements is kept."""
         law = self.form.record_at(x)
-        rows, _ = check(self.goal, self.judge, self.named, law)
+        rows, _ = check(self.goal, self.task.arm, self.task.chain, self.named, law)
         violations = np.array([row.violation for row in rows])
         if not np.isfinite(violations).all():
             return LOST

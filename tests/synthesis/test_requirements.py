@@ -9,10 +9,12 @@ import tfarm
 from tests.shell import refused
 from tfarm.arm import HubFeedback
 from tfarm.arm.chain import file_text
-from tfarm.dsp import Chain
+from tfarm.dsp import Actuator, Chain
+from tfarm.synthesis.goals import Goal, check
 from tfarm.synthesis.judge import judge_of, slowest_allowed
 from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.requirements import GOOD, load_requirements, requirements_of
+from tfarm.synthesis.worst_case import NamedArm
 
 LAB = tfarm.load("sasaki2012-lab")
 
@@ -154,3 +156,19 @@ def test_the_front_is_slower_for_stricter_limits():
     ax = tfarm.plots.trade_off(front)
     drawn = next(line for line in ax.lines if line.get_label().startswith("limits met"))
     np.testing.assert_array_equal(drawn.get_ydata(), [each.time_constant for each in front.points])
+
+
+@pytest.mark.parametrize("name", ["sasaki2012-lab", "sasaki2012"])
+def test_the_values_of_requirements_are_those_of_card_and_slew_of_the_arm_and_chain_as_given(name):
+    """Analog damping of the hub is in both loops; the slew of an arm without damping is its own."""
+    arm, law = tfarm.load(name), HubFeedback(K1=0.5, K2=0.05)
+    chain = Chain(actuator=Actuator(hub_damping=0.3))
+    limits = requirements_of("PM>=45, time-constant<=9, torque<=5, residual<=9")
+    rows, _ = check(Goal(limits, "settling_time_s"), arm, chain, NamedArm(name, arm, {}), law)
+    card = tfarm.result_card(arm, law, chain)
+    assert rows[0].sampled == card.sampled.phase_margin.value
+    assert rows[0].continuous == card.continuous.phase_margin.value
+    assert rows[1].sampled == card.sampled.time_constant
+    run = tfarm.step(arm, law, chain, "slew").sampled
+    assert rows[2].sampled == pytest.approx(abs(run.torque.peak), rel=1e-3)
+    assert rows[2].continuous is None

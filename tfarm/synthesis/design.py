@@ -381,6 +381,10 @@ class _DesignTask:
         score = self.judge(on, self.sizes(on)[0]).score(choice.law)
         return score if score < LOST else np.inf
 
+    def value_on(self, judge: Judge, on: Arm, law: AnyLaw) -> float:
+        """Return the objective of a law on an arm of a judge."""
+        return judge.value(law)
+
     def design(self, choice: _Choice, named: Sequence[NamedArm], case: WorstCase) -> Design:
         """Return the record of a law for these arms."""
         return _record(self, choice, named, case, is_continuous=self.continuous)
@@ -404,7 +408,7 @@ def _record(
         # of an arm without damping the judge has that with which its card is graded
         own_arm, chain = arm_under_chain(arm, task.chain)
         on_arm = Case(own_arm, law, chain)
-        value = judge.value(law)
+        value = task.value_on(judge, arm, law)
         on_arms.append(OnArm(name, numbers, value, stability(on_arm), sampled_brief(on_arm)))
     at_ends = own.at_ends(x)
     physical = own.ends(physical=True)

@@ -175,7 +175,7 @@ def violation_on(task: RequirementTask, choice: RequiredLaw, on: Arm) -> float:
     by_models = violation_by_models(judge, choice)
     if by_models < -near or not choice.checked:
         return max(0.0, by_models)
-    rows, _ = check(choice.goal, judge, NamedArm(on.name, on, {}), choice.law)
+    rows, _ = check(choice.goal, task.arm, task.chain, NamedArm(on.name, on, {}), choice.law)
     return max(0.0, *(each.violation for each in rows))
 
 
@@ -199,7 +199,7 @@ def verify(task: RequirementTask, choice: RequiredLaw, drawn: DrawnArms, tell: T
     found: list[list[Checked]] = []
     for n, each in enumerate(drawn.fresh, 1):
         tell(f"requirements on fresh arm {n} of {len(drawn.fresh)}")
-        rows, _ = check(choice.goal, task.judge(each.arm, choice.goal, 0), each, choice.law)
+        rows, _ = check(choice.goal, task.arm, task.chain, each, choice.law)
         found.append(rows)
     met = sum(all(row.violation <= 0 for row in rows) for rows in found)
     share = None

@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Annotated, Any, NamedTuple, cast
@@ -18,10 +18,12 @@ from typing import Annotated, Any, NamedTuple, cast
 import numpy as np
 from scipy.optimize import minimize
 
-from tfarm.arm import AnyLaw
+from tfarm.arm import AnyLaw, Arm
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.assessment.card import LoopCard, loop_card
 from tfarm.case import Case
+from tfarm.dsp import Chain
+from tfarm.dsp.plant import arm_under_chain
 from tfarm.errors import ConvergenceError
 from tfarm.records import frozen
 from tfarm.schema import Quantity
@@ -47,13 +49,12 @@ class Goal:
     """The least value of a quantity under requirements, as an objective of a judge.
 
     `shifts` tighten each requirement of the sampled (0) and of the continuous-time loop (1) on the model; `delays` are
-    further delays [periods] with which the sampled loop has to be stable.  A violation counts
-    by the `weight`.
+    further delays [periods] with which the sampled loop has to be stable.  A violation counts by the `weight`.
     """
 
     requirements: tuple[Requirement, ...]
     minimised: str
-    shifts: tuple[tuple[float, ...], tuple[float, ...]]
+    shifts: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     delays: tuple[float, ...] = ()
     weight: float = WEIGHT
 
@@ -70,8 +71,13 @@ class Goal:
 
     def tighter(self, shifts: Real) -> Goal:
         """Return the goal with more (2, requirements) of each shift."""
-        more = np.array(self.shifts) + shifts
+        more = np.array(self.shifts) + shifts if any(self.shifts) else shifts
         return replace(self, shifts=(tuple(more[0].tolist()), tuple(more[1].tolist())))
+
+    def shifted(self, loop: int) -> Iterable[tuple[Requirement, float]]:
+        """Return each requirement with its shift in the sampled (0) or the continuous-time loop (1)."""
+        shifts = self.shifts[loop] or (0.0,) * len(self.requirements)
+        return zip(self.requirements, shifts, strict=True)
 
     def scores(self, judge: Any, entries: Sequence[Entry], poles: Any) -> Real:
         """Return the scores of laws that are stable on the model (laws,)."""
@@ -93,8 +99,8 @@ class Goal:
             needs_poles = any(each.name in ("time_constant_s", "least_damping") for each in self.requirements)
             poles = other.poles(sampled.entries) if needs_poles else sampled.poles
             loops.append(LoopMeasures(other, sampled.entries, poles, sampled.period))
-        for loop, shifts in zip(loops, self.shifts, strict=False):
-            for each, shift in zip(self.requirements, shifts, strict=True):
+        for number, loop in enumerate(loops):
+            for each, shift in self.shifted(number):
                 if each.measure.of_slew:
                     continue
                 violation = each.violations(loop.of(each.name)) + shift
@@ -114,7 +120,7 @@ class Goal:
 
     def excess(self, judges: Sequence[Any], law: AnyLaw) -> float:
         """Return the sum of violations of a law on the models, the largest of the arms, without shifts."""
-        plain = replace(self, shifts=(self.none, self.none))
+        plain = replace(self, shifts=((), ()))
         found = []
         for judge in judges:
             entries = judge.entries(law)
@@ -122,12 +128,7 @@ class Goal:
             found.append(float(plain._penalty(judge, loop)[0]) / self.weight)
         return max(found)
 
-    @property
-    def none(self) -> tuple[float, ...]:
-        """No shift of any requirement."""
-        return (0.0,) * len(self.requirements)
-
-    def simulated_score(self, judge: Any, slew: SlewMeasures, law: AnyLaw, limit: float = np.inf) -> float:
+    def simulated_score(self, judge: Any, slew: SlewMeasures, law: AnyLaw) -> float:
         """Return the score of one law with its slew; inf where it is unstable on the model."""
         entries = judge.entries(law)
         if any(model.growth(model.poles(entries)).max() >= 0 for model in (judge.model, *judge.also)):
@@ -144,7 +145,7 @@ class Goal:
             score += float(np.log(max(figures[self.minimised], LEAST_SIZE)))
         else:
             score += float(np.log(max(float(measures.of(self.minimised)[0]), LEAST_SIZE)))
-        for each, shift in zip(self.requirements, self.shifts[0], strict=True):
+        for each, shift in self.shifted(0):
             if each.measure.of_slew:
                 score += self.weight * max(each.violation(figures[each.name]) + shift, 0.0)
         return score
@@ -158,10 +159,6 @@ class Goal:
     def within_one_per_cent(score: float) -> float:
         """Return the score of a value one per cent larger."""
         return score + 0.01
-
-    def value(self, judge: Any, law: AnyLaw) -> float:
-        """Return the quantity of a law, by the best available method."""
-        return exact_values(judge.case(law), slew_of(judge)).sampled[self.minimised]
 
 
 def slowness(judge: Any, entries: Sequence[Entry]) -> Real:
@@ -196,7 +193,9 @@ def _is_of_slew(name: str) -> bool:
 
 def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real) -> Real:
     """Return the point of a simplex that begins at x, with the slew simulated on every arm."""
-    slews = [slew_of(judge) for judge in judges]
+    # modes of a slew that is simulated hundreds of times
+    modes = 8
+    slews = [SlewMeasures(judge.arm, judge.known, judge.chain, modes) for judge in judges]
 
     def score(at: Real) -> float:
         law = form.record_at(at)
@@ -211,11 +210,6 @@ def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real) -> Real:
     return np.asarray(done.x)
 
 
-def slew_of(judge: Any) -> SlewMeasures:
-    """Return the slew of a judge's arm, by as many modes as its model of the sampled loop has."""
-    return SlewMeasures(judge.arm, judge.known, judge.chain, 8)
-
-
 class LoopValues(NamedTuple):
     """Exact values of the measures by name, of the sampled and the continuous-time loop, None of a law in z."""
 
@@ -227,17 +221,19 @@ def card_values(card: LoopCard) -> dict[str, float]:
     """Return the measures of a card, the worst value of what is not defined."""
     gain = [each.value for each in (card.gain_margin, card.gain_reduction)]
     damping = card.least_damping
+    if card.stability != "stable":
+        ratio = -np.inf
+    elif damping is None:
+        ratio = 1.0
+    else:
+        ratio = float(damping.ratio)
     return {
         "gain_margin_db": -np.inf if None in gain else min(cast("list[float]", gain)),
         "phase_margin_deg": _or(card.phase_margin.value, -np.inf),
         "delay_margin_periods": _or(card.delay_margin_periods, -np.inf),
         "peak_sensitivity": _or(card.peak_sensitivity.value, np.inf),
         "disk_margin": _or(card.disk_margin, -np.inf),
-        "least_damping": -np.inf
-        if card.stability != "stable"
-        else 1.0
-        if damping is None
-        else float(damping.ratio),
+        "least_damping": ratio,
         "time_constant_s": _or(card.time_constant, np.inf),
     }
 
@@ -247,8 +243,8 @@ def _or(value: float | None, other: float) -> float:
 
 
 @lru_cache(256)
-def exact_values(case: Case, slew: SlewMeasures | None) -> LoopValues:
-    """Return the measures of both loops of a case by the result card, and of the slew where it is given."""
+def exact_values(case: Case, known: Arm | None) -> LoopValues:
+    """Return the measures of both loops of a case by the result card, and of the slew for an arm `known`, if any."""
     found: list[dict[str, float] | None] = []
     for name in ("sampled", "continuous"):
         if name == "continuous" and case.law.is_discrete:
@@ -259,7 +255,9 @@ def exact_values(case: Case, slew: SlewMeasures | None) -> LoopValues:
         except ConvergenceError:
             found.append({})
     sampled = found[0] or {}
-    if slew is not None:
+    if known is not None:
+        arm, chain = arm_under_chain(case.arm, case.chain)
+        slew = SlewMeasures(arm, arm_under_chain(known, case.chain)[0], chain)
         sampled = {**sampled, **slew.of(case.law)}
     return LoopValues(sampled, found[1])
 
@@ -269,7 +267,9 @@ class Checked(NamedTuple):
 
     requirement: Annotated[str, Quantity("requirement", help="as after --require")]
     arm: Annotated[str, Quantity("arm", help="the arm")]
-    sampled: Annotated[float | None, Quantity("sampled", digits=4, help="exact value of the sampled loop")]
+    sampled: Annotated[
+        float | None, Quantity("sampled", digits=4, help="by the card of the sampled loop, or its slew")
+    ]
     continuous: Annotated[
         float | None, Quantity("continuous-time", digits=4, help="of the continuous-time loop")
     ]
@@ -278,16 +278,18 @@ class Checked(NamedTuple):
     ]
 
 
-def check(goal: Goal, judge: Any, named: NamedArm, law: AnyLaw) -> tuple[list[Checked], Real]:
-    """Return the requirements with exact values of a law on an arm, and violations (2, requirements) of the loops."""
-    values = exact_values(Case(named.arm, law, judge.chain), slew_of(judge) if goal.by_simulation else None)
+def check(goal: Goal, known: Arm, chain: Chain, named: NamedArm, law: AnyLaw) -> tuple[list[Checked], Real]:
+    """Return the requirements with exact values of a law on an arm, and violations (2, requirements) of the loops.
+
+    These are of the arm and the chain as they are given; slews are those of the arm `known`.
+    """
+    values = exact_values(Case(named.arm, law, chain), known if goal.by_simulation else None)
     rows = []
     violations = np.full((2, len(goal.requirements)), -1.0)
     for n, each in enumerate(goal.requirements):
         shown = [None if of is None else of.get(each.name) for of in values]
         for loop, value in enumerate(shown):
-            known = values[loop] is not None and not (loop and each.measure.of_slew)
-            if known:
+            if values[loop] is not None and not (loop and each.measure.of_slew):
                 violations[loop, n] = np.inf if value is None else each.violation(value)
         rows.append(Checked(str(each), named.name, shown[0], shown[1], float(violations[:, n].max())))
     return rows, violations

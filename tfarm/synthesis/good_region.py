@@ -105,7 +105,8 @@ class GoodRegion:
         # digits of a gain that is typed
         K1, K2 = (float(f"{value:.4g}") for value in (self.x[column], self.y[row]))
         law = HubFeedback(K1=K1, K2=K2)
-        rows, _ = check(self.goal, self.judge, NamedArm(self.judge.arm.name, self.judge.known, {}), law)
+        arm = self.judge.known
+        rows, _ = check(self.goal, arm, self.judge.chain, NamedArm(arm.name, arm, {}), law)
         return RequiredGains(law, tuple(rows))
 
 

@@ -25,7 +25,7 @@ from tfarm.loop.edges import most_modes
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.records import frozen
 from tfarm.schema import Quantity
-from tfarm.synthesis.goals import WEIGHT, Checked, Goal, check, polished
+from tfarm.synthesis.goals import WEIGHT, Checked, Goal, check, exact_values, polished
 from tfarm.synthesis.judge import LOST, Judge, judge_of, model_sizes
 from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.models import sampled_model
@@ -90,8 +90,7 @@ class RequirementTask:
     @property
     def goal(self) -> Goal:
         """The goal without shifts."""
-        none = (0.0,) * len(self.requirements)
-        return Goal(self.requirements, self.minimised, (none, none))
+        return Goal(self.requirements, self.minimised)
 
     def judge(self, on: Arm, goal: Goal, step: int) -> Judge:
         """Return the judge of laws on an arm by the models of a step of their sizes, with the delays required.
@@ -111,7 +110,7 @@ class RequirementTask:
             found = replace(found, also=(*found.also, stable, *own.also))
         sampling = found.chain.sampling
         delays = list(goal.delays)
-        for each, shift in zip(self.requirements, goal.shifts[0], strict=True):
+        for each, shift in goal.shifted(0):
             if each.name == DELAY:
                 # a little more, so that the exact margin is not below the limit by its rounding
                 longest = each.limit * (1.0005 + shift)
@@ -194,8 +193,8 @@ class RequirementTask:
         score = float(Worst(judges).scores(form, x[:, None])[0])
         rows = []
         violations = np.full((2, len(self.requirements)), -1.0)
-        for each, judge in zip(named, judges, strict=True):
-            own, exact = check(goal, judge, each, law)
+        for each in named:
+            own, exact = check(goal, self.arm, self.chain, each, law)
             rows += own
             violations = np.maximum(violations, exact)
         return RequiredLaw(Worst(judges), found, score, x, law, goal, tuple(rows), violations)
@@ -217,6 +216,15 @@ class RequirementTask:
     def objective(self) -> str:
         """The quantity that is minimised, as it is written."""
         return MEASURES[self.minimised].short[0]
+
+    def values_on(self, on: Arm, law: AnyLaw) -> dict[str, float]:
+        """Return the exact measures of a law on an arm, of the sampled loop, with its slew where that is minimised."""
+        known = self.arm if MEASURES[self.minimised].of_slew else None
+        return exact_values(Case(on, law, self.chain), known).sampled
+
+    def value_on(self, judge: Judge, on: Arm, law: AnyLaw) -> float:
+        """Return the quantity of a law that is minimised, on an arm of a judge."""
+        return self.values_on(on, law)[self.minimised]
 
     def meets(self, named: Sequence[NamedArm]) -> bool:
         """Return whether a law of the structure meets all requirements on all arms."""

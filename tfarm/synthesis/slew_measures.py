@@ -9,9 +9,9 @@ import numpy as np
 from tfarm.arm import AnyLaw, Arm
 from tfarm.case import Case
 from tfarm.dsp import Chain, Scenario, traces
+from tfarm.dsp.results import simulate_modes
 from tfarm.dsp.scenarios import slew_scenario
 from tfarm.dsp.shaping import impulses_of
-from tfarm.dsp.simulate import Simulator
 from tfarm.dsp.simulation import final_value, settling_time
 from tfarm.records import frozen
 from tfarm.spectrum.table import first_frequency
@@ -27,12 +27,15 @@ MOST_SAMPLES = 10_000
 
 @frozen
 class SlewMeasures:
-    """The slew of an arm with references of the arm `known`, by `count` modes, four records a sample between."""
+    """The slew of an arm with references of the arm `known`, four records a sample between.
+
+    By `count` modes, or as many as `simulate_modes` takes for enough.
+    """
 
     arm: Arm
     known: Arm
     chain: Chain
-    count: int
+    count: int | None = None
 
     @cached_property
     def tasks(self) -> list[Scenario]:
@@ -57,7 +60,7 @@ class SlewMeasures:
         impulses = impulses_of(self.known, self.chain, law)
         for plain in self.tasks:
             task = plain.through(impulses) if impulses.size > 1 else plain
-            run = Simulator(case, task, count=self.count, between=4, outputs=(TIP,)).run()
+            run, _ = simulate_modes(case, task, self.count, between=4, outputs=(TIP,))
             if run.stopped is not None:
                 names = ("settling_time_s", "overshoot", "residual_moment", "peak_input")
                 return dict.fromkeys(names, np.inf) | found

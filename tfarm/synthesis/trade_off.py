@@ -18,7 +18,6 @@ from tfarm.arm import AnyLaw
 from tfarm.errors import ConvergenceError
 from tfarm.records import frozen
 from tfarm.schema import Quantity
-from tfarm.synthesis.goals import exact_values, slew_of
 from tfarm.synthesis.required import RequiredLaw, RequirementTask
 from tfarm.synthesis.requirements import MEASURES, Requirement
 from tfarm.synthesis.worst_case import NamedArm
@@ -72,7 +71,7 @@ def front(task: RequirementTask, named: Sequence[NamedArm], number: int = 12) ->
     before: RequiredLaw | None = None
     points = []
     laws: list[Any] = []
-    # from a quarter of the limits of good to nearly twice as strict ones
+    # from less than half of the limits of good to nearly twice as strict ones
     for robustness in np.geomspace(0.4, 1.9, number).tolist():
         own = replace(task, requirements=(*scaled_limits(robustness), *others))
         start = None if before is None else before._replace(goal=own.goal)
@@ -86,8 +85,7 @@ def front(task: RequirementTask, named: Sequence[NamedArm], number: int = 12) ->
             if before is None:
                 raise
             break
-        judge = found.worst.judges[0]
-        values = exact_values(judge.case(found.law), slew_of(judge)).sampled
+        values = task.values_on(task.arm, found.law)
         form = found.search.form
         points.append(
             FrontPoint(
