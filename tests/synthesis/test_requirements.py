@@ -50,6 +50,22 @@ def test_what_is_large_in_a_good_loop_is_not_minimised(capsys):
     assert "is large in a good loop" in err
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--png", "out.png"], "--png = 'out.png': goes with --trade-off alone"),
+        (["--csv", "out.csv"], "--csv = 'out.csv': goes with --trade-off alone"),
+        (["--trade-off", "--continuous"], "--continuous = true: the front is of given arms and both loops"),
+        (["--trade-off", "--range", "payload.mass=0,1"], "--range"),
+        (["--trade-off", "--save", "-"], "--save = '-': a front has several laws"),
+        (["--continuous", "--require", "good"], "requirements are of both loops"),
+        (["--fresh", "0", "--posterior", "Makefile"], "fresh arms = 0"),
+    ],
+)
+def test_options_that_exclude_each_other_are_refused_before_any_work(capsys, options, words):
+    assert words in refused(capsys, "design", "sasaki2012-lab", *options)
+
+
 def test_requirements_of_a_file_are_read_and_its_errors_name_it(tmp_path):
     file = tmp_path / "arm.toml"
     file.write_text(f"{file_text(LAB)}\n[requirements]\nPM = 50\n")

@@ -10,7 +10,7 @@ from typing import Annotated, Any, cast
 import typer
 
 import tfarm
-from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, TWO_GAINS
+from tfarm.arm import ANGLE_GAIN, MOMENT_GAIN, RATE_GAIN, TWO_GAINS, Arm
 from tfarm.arm.reading import ArmFile
 from tfarm.cli.app import add_command
 from tfarm.cli.options import (
@@ -37,6 +37,7 @@ from tfarm.cli.options import (
 from tfarm.cli.output import emit, emit_record
 from tfarm.cli.progress import advance, print_line
 from tfarm.errors import require
+from tfarm.files import is_standard_output
 
 command = partial(add_command, "Design")
 study_command = partial(add_command, "Study")
@@ -110,16 +111,11 @@ def design(
         ANGLE_GAIN: kp,
     }
     if trade_off:
-        drawn = {"--range": over, "--study": study, "--posterior": posterior}
-        refuse(drawn | {"--continuous": continuous or None}, "the front is of given arms and both loops")
-        front = tfarm.trade_off(subject, objective, **options)
-        files = []
-        for n, each in enumerate(front.laws, 1):
-            if save is not None:
-                files.append(save.with_stem(f"{save.stem}-{n:02}"))
-                save_law(tfarm.Case(subject, each).law, files[-1])
-        show(front, also=files)
+        others = {"range": over, "study": study, "posterior": posterior, "continuous": continuous}
+        refuse(others, "the front is of given arms and both loops")
+        _emit_front(subject, objective, options, save, show)
         return
+    refuse({name: show.keywords[name] for name in ("csv", "png")}, "goes with --trade-off alone")
     found = tfarm.design(
         subject,
         objective,
@@ -133,6 +129,23 @@ def design(
     if save is not None:
         save_law(tfarm.Case(subject, found.law).law, save)
     show(found, also=(save,))
+
+
+def _emit_front(
+    arm: Arm, objective: str | None, options: Mapping[str, Any], save: Path | None, show: Any
+) -> None:
+    """Emit the front of speed against robustness, and write its laws to numbered files."""
+    from tfarm.arm.writing import save_law
+
+    is_stream = save is not None and is_standard_output(save)
+    refuse({"save": save if is_stream else None}, "a front has several laws; give the name of a file")
+    front = tfarm.trade_off(arm, objective, **options)
+    files = []
+    for n, each in enumerate(front.laws, 1):
+        if save is not None:
+            files.append(save.with_stem(f"{save.stem}-{n:02}"))
+            save_law(tfarm.Case(arm, each).law, files[-1])
+    show(front, also=files)
 
 
 @command(epilog="export sasaki2012-lab --what controller --as c --out firmware")

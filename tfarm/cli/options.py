@@ -307,4 +307,5 @@ def outputs_on(
 def refuse(others: Mapping[str, Any], remedy: str) -> None:
     """Raise ParameterError for an option, by its name as a parameter, that another one excludes."""
     for name, value in others.items():
-        require(value is None or value is False, f"--{name.replace('_', '-')}", value, remedy)
+        shown = str(value) if isinstance(value, Path) else value
+        require(value is None or value is False, f"--{name.replace('_', '-')}", shown, remedy)
