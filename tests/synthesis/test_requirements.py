@@ -13,6 +13,7 @@ from tfarm.dsp import Actuator, Chain
 from tfarm.synthesis.goals import Goal, check
 from tfarm.synthesis.judge import judge_of, slowest_allowed
 from tfarm.synthesis.measures import LoopMeasures
+from tfarm.synthesis.required import RequirementTask
 from tfarm.synthesis.requirements import GOOD, load_requirements, requirements_of
 from tfarm.synthesis.worst_case import NamedArm
 
@@ -117,6 +118,22 @@ def test_the_law_is_good_on_its_card_and_none_of_a_grid_is_faster(good):
         assert both != ("good", "good") or other.sampled.time_constant > 0.995 * good.value
 
 
+OTHERS = ["quanser-2dsfl", "sasaki2012", "sasaki2012-as-printed", "stocky-steel"]
+PRESETS = ["quanser-flexlink", *(pytest.param(each, marks=pytest.mark.survey) for each in OTHERS)]
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_law_of_every_preset_is_good_by_default(name):
+    """On quanser-flexlink the search ends unstable by a mode that no model has: the gains are those of the map."""
+    arm = tfarm.load(name)
+    found = tfarm.design(arm)
+    card = tfarm.result_card(arm, found.law)
+    assert found.is_met
+    assert card.continuous.grade == card.sampled.grade == "good"
+    assert card.continuous.stability == card.sampled.stability == "stable"
+    assert all(math.isfinite(each.change) for each in found.sensitivities)
+
+
 def test_active_requirements_are_those_at_their_limit(good):
     rows = {each.requirement: each for each in good.requirements}
     for name in good.active:
@@ -156,6 +173,25 @@ def test_requirements_hold_on_a_further_arm_too():
     for arm in (LAB, heavy):
         card = tfarm.result_card(arm, found.law)
         assert card.continuous.grade == card.sampled.grade == "good"
+
+
+def test_a_law_of_stricter_limits_is_one_of_laxer_limits(monkeypatch):
+    """The second of three searches finds no law: it has that of the third, and the first none that is slower."""
+    search = RequirementTask.find
+    found = {}
+
+    def find(task, named, before, effort):
+        own = search(task, named, before, "near")
+        found.setdefault(task.requirements[1].limit, own)
+        if len(found) == 2:
+            return own._replace(checked=tuple(each._replace(violation=1.0) for each in own.checked))
+        return own
+
+    monkeypatch.setattr(RequirementTask, "find", find)
+    first, second, third = tfarm.trade_off(LAB, number=3).points
+    assert third.is_met
+    assert second == third._replace(robustness=second.robustness)
+    assert first.value <= second.value
 
 
 def test_the_front_is_slower_for_stricter_limits():

@@ -20,11 +20,9 @@ from tfarm.spectrum.gains import default_gains
 from tfarm.tuner import (
     baselines,
     best_constant,
-    extra_insensitive,
     residual_rms,
     shaped_trial,
     slew_trial,
-    zero_vibration,
 )
 from tfarm.tuner.baselines import quantised_chain, shaper, tried_loops
 from tfarm.tuner.tuning import usual_plan
@@ -58,43 +56,6 @@ def test_the_best_constant_gain_has_the_lowest_cost_of_the_stability_intervals(m
     assert found.cost == cost(found.gain)
     assert len(tried) > 1 or not windows
     assert all(any(low <= K < high for low, high in windows) or not (windows or K) for K in tried)
-
-
-POLES = [0.999 * np.exp(0.3j), 0.97 * np.exp(0.71j), np.exp(1j * math.pi / 4), 0.9 * np.exp(2.04j)]
-
-
-def left(impulses, z):
-    """The vibration that an impulse leaves after shaping, in units of that without: |sum of c_k z^-k|."""
-    return abs(np.polyval(impulses[::-1], 1 / z))
-
-
-@pytest.mark.parametrize("z", POLES)
-def test_zero_vibration_is_zero_at_the_pole(z):
-    impulses = zero_vibration(z)
-    assert impulses.sum() == pytest.approx(1, rel=1e-14)
-    assert max(left(impulses, z), left(impulses, z.conjugate())) < 1e-14
-    assert impulses.size == math.floor(math.pi / abs(np.angle(z)) * (1 + 1e-12)) + 2
-
-
-def test_on_the_grid_it_is_the_classical_pair():
-    """Half a period of 4 samples: two impulses, 1/(1 + k) and k/(1 + k) with k = e^{-zeta pi/sqrt(1 - zeta^2)}."""
-    z = 0.98 * np.exp(1j * math.pi / 4)
-    k = abs(z) ** 4
-    np.testing.assert_allclose(zero_vibration(z), [1 / (1 + k), 0, 0, 0, k / (1 + k), 0], atol=1e-15)
-
-
-def test_extra_insensitive_tolerates_a_share_at_the_mode():
-    """Undamped, half a period of a whole number of samples: about V at the mode, and little around it."""
-    w = math.pi / 40
-    impulses = extra_insensitive(np.exp(1j * w))
-    at = [left(impulses, np.exp(1j * w * factor)) for factor in (0.86, 1.0, 1.14)]
-    assert at[0] < 2e-3
-    assert at[1] == pytest.approx(0.05, rel=0.05)
-    assert at[2] < 2e-3
-    band = [left(impulses, np.exp(1j * w * f)) for f in np.linspace(0.82, 1.18, 50)]
-    assert max(band) < 0.055
-    zv = [left(zero_vibration(np.exp(1j * w)), np.exp(1j * w * f)) for f in (0.82, 1.18)]
-    assert min(zv) > 4 * max(band)
 
 
 def test_a_one_mode_arm_is_left_at_rest():

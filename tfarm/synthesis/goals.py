@@ -29,7 +29,7 @@ from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.gains import turning_inertia
 from tfarm.spectrum.table import first_frequency
-from tfarm.synthesis.judge import slowest_allowed
+from tfarm.synthesis.judge import LOST, slowest_allowed
 from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.requirements import Requirement
 from tfarm.synthesis.slew_measures import SlewMeasures
@@ -129,10 +129,10 @@ class Goal:
         return max(found)
 
     def simulated_score(self, judge: Any, slew: SlewMeasures, law: AnyLaw) -> float:
-        """Return the score of one law with its slew; inf where it is unstable on the model."""
+        """Return the score of one law with its slew; `LOST` where it is unstable on the model, or has no figure."""
         entries = judge.entries(law)
         if any(model.growth(model.poles(entries)).max() >= 0 for model in (judge.model, *judge.also)):
-            return np.inf
+            return LOST
         measures = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
         score = float((slowness(judge, entries) + self._penalty(judge, measures))[0])
         speed = float(measures.dominant_time_constant(first_frequency(judge.arm))[0])
@@ -148,7 +148,7 @@ class Goal:
         for each, shift in self.shifted(0):
             if each.measure.of_slew:
                 score += self.weight * max(each.violation(figures[each.name]) + shift, 0.0)
-        return score
+        return min(score, LOST)
 
     @staticmethod
     def worst(values: Sequence[float]) -> float:

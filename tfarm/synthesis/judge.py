@@ -113,6 +113,17 @@ def longest_delay(model: DesignModel) -> float:
 def _passing_delay(model: DesignModel, L: Complex) -> Real:
     """Return that delay [s] by the passages between points of the grid alone, at most the longest."""
     q = model.angles
+    passes, share, late = gain_crossings(L)
+    late = late / (q[:-1] + share * np.diff(q))
+    longest = longest_delay(model)
+    return np.where(passes, (model.period or 1.0) * late, longest).min(axis=1, initial=longest)
+
+
+def gain_crossings(L: Complex) -> tuple[Any, Real, Real]:
+    """Return where |L| (laws, m) passes 1 between two points of the grid, the share of the way, and the lag to -1.
+
+    Each is (laws, m - 1), along straight lines; the lag [rad] is in [0, 2 pi).
+    """
     around = 2 * np.pi
     size = np.log(np.maximum(abs(L), LEAST_SIZE))
     turn = np.mod(np.pi + np.unwrap(np.angle(L)), around)
@@ -121,9 +132,13 @@ def _passing_delay(model: DesignModel, L: Complex) -> Real:
     passes = (size[:, 1:] * here <= 0) & (change != 0)
     share = here / np.where(passes, -change, 1.0)
     step = np.mod(np.diff(turn) + np.pi, around) - np.pi
-    late = np.mod(turn[:, :-1] + share * step, around) / (q[:-1] + share * np.diff(q))
-    longest = longest_delay(model)
-    return np.where(passes, (model.period or 1.0) * late, longest).min(axis=1, initial=longest)
+    return passes, share, np.mod(turn[:, :-1] + share * step, around)
+
+
+def peak_of(model: DesignModel, distance: Any) -> Any:
+    """Return the largest |S| of the least |1 + L|; in continuous time at least 1, as L -> 0 beyond the grid."""
+    least = 1.0 if model.period is None else 0.0
+    return np.maximum(1 / np.maximum(distance, LEAST_SIZE), least)
 
 
 class Objective(NamedTuple):
@@ -239,16 +254,12 @@ class Judge:
 
     def peak_sensitivity(self, law: AnyLaw) -> float:
         """Return the largest |S|, likewise."""
-        return float(self.peak(self._lowest(law, lambda L: np.asarray(abs(1 + L)))))
+        return float(peak_of(self.model, self._lowest(law, lambda L: np.asarray(abs(1 + L)))))
 
     def _lowest(self, law: AnyLaw, of: Callable[[Complex], Real]) -> float:
         """Return the least of a function of the loop function."""
         entries = self.entries(law)
         return lowest(lambda angles: of(self.model.loop(entries, angles)[0]), self.model.angles)[0]
-
-    def peak(self, distance: Any) -> Any:
-        """Return the largest |S| of the least |1 + L|; in continuous time at least 1, as L -> 0 beyond the grid."""
-        return np.maximum(1 / np.maximum(distance, LEAST_SIZE), 0.0 if self.is_sampled else 1.0)
 
     def exact_damping(self, law: AnyLaw) -> float:
         """Return the least damping ratio; of the continuous-time loop that of its exact poles."""
@@ -304,7 +315,7 @@ OBJECTIVES = {
     ),
     "margin": Objective(disk_score, Judge.disk_margin, is_negated=True, of_poles=True, needs_speed=True),
     "sensitivity": Objective(
-        lambda judge, entries, _: judge.peak(abs(1 + judge.model.loop(entries)).min(axis=1)),
+        lambda judge, entries, _: peak_of(judge.model, abs(1 + judge.model.loop(entries)).min(axis=1)),
         Judge.peak_sensitivity,
         of_poles=True,
         needs_speed=True,

@@ -13,7 +13,7 @@ import numpy as np
 
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.records import frozen
-from tfarm.synthesis.judge import damping_of, delay, dominant_time_constant
+from tfarm.synthesis.judge import damping_of, delay, disk_of, dominant_time_constant, gain_crossings, peak_of
 from tfarm.synthesis.models import DesignModel
 from tfarm.synthesis.structures import Entry
 
@@ -52,13 +52,9 @@ class LoopMeasures:
 
     def phase_margin_deg(self) -> Real:
         """Return the least distance [deg] of L from -1 where abs(L) passes 1 (laws,)."""
-        size = np.log(np.maximum(abs(self.L), LEAST_SIZE))
-        turn = np.pi + np.unwrap(np.angle(self.L))
-        change = np.diff(size)
-        passes = (size[:, 1:] * size[:, :-1] <= 0) & (change != 0)
-        share = size[:, :-1] / np.where(passes, -change, 1.0)
-        late = np.mod(turn[:, :-1] + share * np.diff(turn), 2 * np.pi)
-        return np.degrees(np.where(passes, np.minimum(late, 2 * np.pi - late), np.inf).min(axis=1))
+        passes, _, late = gain_crossings(self.L)
+        nearest = np.minimum(late, 2 * np.pi - late)
+        return np.degrees(np.where(passes, nearest, np.inf).min(axis=1))
 
     def delay_margin_periods(self) -> Real:
         """Return the delay margin in sampling periods (laws,)."""
@@ -66,12 +62,11 @@ class LoopMeasures:
 
     def peak_sensitivity(self) -> Real:
         """Return the largest abs(S) on the grid (laws,)."""
-        least = 0.0 if self.model.period is not None else 1.0
-        return np.maximum(1 / np.maximum(abs(1 + self.L).min(axis=1), LEAST_SIZE), least)
+        return np.asarray(peak_of(self.model, abs(1 + self.L).min(axis=1)))
 
     def disk_margin(self) -> Real:
         """Return the least 2 abs(1 + L)/abs(1 - L) (laws,)."""
-        return (2 * abs(1 + self.L) / np.maximum(abs(1 - self.L), LEAST_SIZE)).min(axis=1)
+        return disk_of(self.L).min(axis=1)
 
     def least_damping(self) -> Real:
         """Return the least damping ratio of the oscillating poles (laws,)."""

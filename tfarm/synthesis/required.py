@@ -254,7 +254,10 @@ class RequirementTask:
         return tuple(found)
 
     def sensitivities(self, choice: RequiredLaw) -> list[RequirementSlope]:
-        """Return the changes of the required quantities of the sampled loop by the model of the first arm."""
+        """Return the changes of the required quantities of the sampled loop by the model of the first arm.
+
+        A margin without a limit has none.
+        """
         judge = choice.worst.judges[0]
         form = choice.search.form
         at = form.coefficients(choice.x[:, None])
@@ -266,8 +269,10 @@ class RequirementTask:
             entries = form.entries(c)
             loop = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
             for each in self.requirements:
-                if not each.measure.of_slew:
-                    values = loop.of(each.name)
+                if each.measure.of_slew:
+                    continue
+                values = loop.of(each.name)
+                if np.isfinite(values).all():
                     slope = float(values[0] - values[1]) / (2 * change) / 100
                     found.append(RequirementSlope(str(each), coefficient, slope))
         return found

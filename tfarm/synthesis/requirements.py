@@ -19,6 +19,7 @@ import numpy as np
 
 from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arrays import Real
+from tfarm.assessment.card import GRADE_LIMITS
 from tfarm.errors import ParameterError, must_be_known, name_file, require
 from tfarm.schema import Quantity
 
@@ -86,12 +87,18 @@ class Requirement(NamedTuple):
         return f"{measure.short[0]}{self.sense}{value}"
 
 
-GOOD = (
-    Requirement("gain_margin_db", ">=", 6.0),
-    Requirement("phase_margin_deg", ">=", 45.0),
-    Requirement("delay_margin_periods", ">=", 1.0),
-    Requirement("peak_sensitivity", "<=", 2.0),
-)
+def limits_of_good(robustness: float = 1.0) -> tuple[Requirement, ...]:
+    """Return the limits of the grade good, made laxer by a robustness below 1 and stricter by one above."""
+    gain, phase, periods, peak = (GRADE_LIMITS[each][0] for each in ("gain", "phase", "periods", "peak"))
+    return (
+        Requirement("gain_margin_db", ">=", gain * robustness),
+        Requirement("phase_margin_deg", ">=", phase * robustness),
+        Requirement("delay_margin_periods", ">=", periods * robustness),
+        Requirement("peak_sensitivity", "<=", 1.0 + (peak - 1.0) / robustness),
+    )
+
+
+GOOD = limits_of_good()
 
 
 def measure_named(word: str, key: str) -> str:

@@ -19,7 +19,7 @@ from tfarm.errors import ConvergenceError
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.synthesis.required import RequiredLaw, RequirementTask
-from tfarm.synthesis.requirements import MEASURES, Requirement
+from tfarm.synthesis.requirements import GOOD, MEASURES, limits_of_good
 from tfarm.synthesis.worst_case import NamedArm
 
 
@@ -51,29 +51,19 @@ class TradeOff:
     laws: tuple[AnyLaw, ...]
 
 
-def scaled_limits(robustness: float) -> tuple[Requirement, ...]:
-    """Return the limits of the grade good, made laxer below a robustness of 1 and stricter above."""
-    return (
-        Requirement("gain_margin_db", ">=", 6.0 * robustness),
-        Requirement("phase_margin_deg", ">=", 45.0 * robustness),
-        Requirement("delay_margin_periods", ">=", robustness),
-        Requirement("peak_sensitivity", "<=", 1.0 + 1.0 / robustness),
-    )
-
-
 def front(task: RequirementTask, named: Sequence[NamedArm], number: int = 12) -> TradeOff:
     """Return the front of a task, whose own requirements of other quantities hold at every point.
 
     Raises ConvergenceError where no law is stable on all arms.
     """
-    limited = {each.name for each in scaled_limits(1.0)}
+    limited = {each.name for each in GOOD}
     others = tuple(each for each in task.requirements if each.name not in limited)
     before: RequiredLaw | None = None
     points = []
     laws: list[Any] = []
     # from less than half of the limits of good to nearly twice as strict ones
     for robustness in np.geomspace(0.4, 1.9, number).tolist():
-        own = replace(task, requirements=(*scaled_limits(robustness), *others))
+        own = replace(task, requirements=(*limits_of_good(robustness), *others))
         start = None if before is None else before._replace(goal=own.goal)
         try:
             found = own.find(named, start, "whole" if before is None else "near")
@@ -102,5 +92,11 @@ def front(task: RequirementTask, named: Sequence[NamedArm], number: int = 12) ->
         )
         laws.append(found.law)
         before = found
+    # a law that meets stricter limits meets laxer ones too, and is taken where the search found a worse one
+    for n in range(len(points) - 2, -1, -1):
+        stricter = points[n + 1]
+        if stricter.is_met and not (points[n].is_met and points[n].value <= stricter.value):
+            points[n] = stricter._replace(robustness=points[n].robustness)
+            laws[n] = laws[n + 1]
     measure = MEASURES[task.minimised]
     return TradeOff(task.arm.name, task.form.name, measure.title, measure.unit, tuple(points), tuple(laws))
