@@ -56,7 +56,6 @@ class DesignModel:
     higher: tuple[complex, ...]
     last: int
     own_moment: Real
-    least_decay: float = 0.0
 
     # ------------------------------------------------------------ laws in states
 
@@ -124,10 +123,10 @@ class DesignModel:
         return np.linalg.eigvals(found).astype(complex)
 
     def growth(self, poles: Complex) -> Real:
-        """Return ln |z| of poles, more by `least_decay`, or Re s/|s| less the error of the model: below 0 if stable."""
+        """Return ln |z| of poles, or Re s/|s| less the error of the model: below 0 if stable."""
         size = np.maximum(abs(poles), LEAST_SIZE)
         if self.period is not None:
-            return np.log(size) + self.least_decay
+            return np.log(size)
         # a smaller growth may be an error of the model
         return poles.real / size - 1e-6
 

@@ -105,9 +105,7 @@ class RequirementTask:
             # the loop of the arm as it is has to be stable
             most = model_sizes(on, self.chain, self.modes, continuous=False)[0]
             own = judge_of(on, self.arm, self.chain, goal, self.form.signals, self.modes, most)
-            # not to its rounding: the search would end where the decay of a mode passes 0
-            stable = replace(own.model, least_decay=1e-12)
-            found = replace(found, also=(*found.also, stable, *own.also))
+            found = replace(found, also=(*found.also, own.model, *own.also))
         sampling = found.chain.sampling
         delays = list(goal.delays)
         for each, shift in goal.shifted(0):
