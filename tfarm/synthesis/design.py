@@ -171,10 +171,7 @@ def design(
     alternatives: tuple[str, ...] = ()
     if found.violation > 0:
         conflicts = search_for.conflicts(found, named)
-        # another structure is out of reach where the link has no damping: a search takes minutes
-        forms = iter(()) if arm.has_elastic_link else _other_forms(options)
-        others = (replace(search_for, form=each) for each in forms)
-        alternatives = tuple(islice((each.form.name for each in others if each.meets(named)), 1))
+        alternatives = _alternatives(options, search_for, named)
     return replace(
         _record(search_for, found, named, case, is_continuous=False),
         requirements=found.checked,
@@ -313,6 +310,15 @@ def _other_forms(options: _Options) -> Iterator[Structure]:
     # a search among more takes more than a minute
     most_coefficients = 6
     yield from sorted((each for each in forms if each.size <= most_coefficients), key=attrgetter("size"))
+
+
+def _alternatives(options: _Options, task: RequirementTask, named: Sequence[NamedArm]) -> tuple[str, ...]:
+    """Return the first other structure with a law that meets all requirements on all arms, if there is one."""
+    if options.arm.has_elastic_link:
+        # with the large models of an arm without damping a search takes minutes
+        return ()
+    others = (replace(task, form=each) for each in _other_forms(options))
+    return tuple(islice((each.form.name for each in others if each.meets(named)), 1))
 
 
 @frozen
