@@ -254,10 +254,14 @@ class Varied:
         return np.r_[upper, upper[upper.imag > 0].conj()]
 
     def singular(self, values: Real) -> Real:
-        """Return -1/C of the damped segments, at m values (m, p)."""
+        """Return -1/C of the damped segments, at m values (m, p); NaN where there are fewer of them."""
         if not self.is_of_arm:
             return np.tile(np.array(self.first.k.singular), (values.size, 1))
-        return np.array([self.at(float(value)).k.singular for value in values])
+        points = [self.at(float(value)).k.singular for value in values]
+        found = np.full((values.size, max(map(len, points))), np.nan)
+        for row, each in zip(found, points, strict=True):
+            row[: len(each)] = each
+        return found
 
     # ------------------------------------------------------------ complete in a box
 
