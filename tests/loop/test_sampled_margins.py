@@ -17,6 +17,7 @@ from tests.shared import circle_crossings, thinned
 from tests.similar import EITHER
 from tfarm import HubFeedback, Law, modes
 from tfarm.arm import as_law
+from tfarm.arrays import MACHINE_EPS
 from tfarm.case import Case
 from tfarm.dsp import Chain, Converters, Sampling
 from tfarm.errors import ConvergenceError, ParameterError
@@ -24,6 +25,7 @@ from tfarm.loop.circle_crossings import ends_of_K1, interval_around, sampled_map
 from tfarm.loop.edges import DelayMargin, Figure, delay_margin, required_damping
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_analysis import Analysis
+from tfarm.loop.sampled_poles import FADED_RADIUS
 from tfarm.loop.sampled_verdict import Verdict, sampled_verdict
 from tfarm.schema import text, to_dict
 from tfarm.spectrum.gains import default_gains
@@ -187,13 +189,13 @@ def some_sampled(seed):
 
 
 def answers(arm, law, chain, units):
-    """Intervals of K1 and K2 in units of the law's, delay margin, poles in z; None where modes are not determined."""
+    """Intervals of K1 and K2 in units of the law's, delay margin, poles; None where modes are not determined."""
     try:
         loop = sampled_loop(Case(arm, law, chain), count=6)
     except ConvergenceError:
         return None
     windows = [np.array(stable_windows(loop, name)) / units[name] for name in ("K1", "K2")]
-    return windows, delay_margin(loop), loop.poles.z
+    return windows, delay_margin(loop), loop.poles
 
 
 SEEDS = [STILL_RIG, *((6, n) for n in range(24))]
@@ -215,7 +217,11 @@ def test_a_sampled_loop_has_the_same_windows_delay_and_poles(seed, units):
         np.testing.assert_allclose(theirs, mine, rtol=1e-6)
     assert there[1].samples == pytest.approx(here[1].samples, abs=1e-6)
     assert there[1].is_bound == here[1].is_bound
-    assert abs(there[2][:, None] - here[2]).min(axis=1).max() < 1e-9
+    # Overdamped modes are fitted by least squares without singular values below 1e-12: rounding changes their shares by
+    # EPS/1e-12, and a pole that such a share moves by less than FADED_RADIUS by that part of it.
+    is_fitted = (abs(there[2].z) < FADED_RADIUS) & (there[2].mode == 0)
+    tolerance = np.where(is_fitted, FADED_RADIUS * MACHINE_EPS / 1e-12, 1e-9)
+    assert (abs(there[2].z[:, None] - here[2].z).min(axis=1) < tolerance).all()
 
 
 def test_an_arm_that_something_holds_has_its_whole_window():
