@@ -76,7 +76,7 @@ def records(tmp_path_factory):
     law, unit = default_gains(rig), rig.input_per_torque
     factors, delays = np.linspace(0.1, 3.0, 8), np.linspace(0.0, 0.03, 9)
     makers = {
-        "comparison": lambda: [tfarm.compare([LAB, LAB.having(hub_inertia=0.2)], modes=2)],
+        "comparison": lambda: [tfarm.compare([LAB, LAB.with_numbers(hub_inertia=0.2)], modes=2)],
         "bode": lambda: [tfarm.bode(LAB, "root_moment", (1.0, 300.0))],
         "gain_map": lambda: [plane()],
         "locus": lambda: [tfarm.locus(LAB, LAW, "K2", -1.0, 1.6, points=60, branches=3)],

@@ -166,7 +166,7 @@ def test_no_objective_ends_without_a_controller(objective):
 
 
 def test_requirements_hold_on_a_further_arm_too():
-    heavy = LAB.having(payload_mass=1.3 * LAB.payload.mass + 0.05)
+    heavy = LAB.with_numbers(payload_mass=1.3 * LAB.payload.mass + 0.05)
     found = tfarm.design(LAB, "time-constant", also=[heavy])
     assert found.is_met
     assert {each.arm for each in found.requirements} == {each.name for each in found.arms}

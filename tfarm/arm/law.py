@@ -24,6 +24,7 @@ from tfarm.arm.feedback import AT_HUB, GAINS, ON, OUTPUT_OF, HubFeedback
 from tfarm.arm.records import Arm
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean, must_be_known, require
+from tfarm.moved import FormerName
 from tfarm.records import frozen
 
 # before the name of a signal: its reference
@@ -176,7 +177,7 @@ class Law:
 
     @property
     def numbers(self) -> dict[str, float]:
-        """Each number other than 0 in which the loop is linear, by its name in `having`.
+        """Each number other than 0 in which the loop is linear, by its name in `with_number`.
 
         That is "gain", a factor on the law, and for each signal with a block of its own the constant gain, or the
         coefficients of its polynomials and, for more than one, a factor, "hub_angle.gain".  A signal in several parts
@@ -198,7 +199,7 @@ class Law:
 
     @property
     def part_gains(self) -> dict[str, tuple[int, float]]:
-        """Each part of a single signal: its index among `parts`, and its gain, by its name in `having`.
+        """Each part of a single signal: its index among `parts`, and its gain, by its name in `with_number`.
 
         A constant gain has the name of its signal, "hub_angle"; other blocks have a factor of 1, "hub_angle.gain".
         """
@@ -282,15 +283,17 @@ class Law:
 
     def times(self, factor: float) -> Law:
         """Return the law times a number."""
-        return self.weighted([factor] * len(self.parts))
+        return self.with_factors([factor] * len(self.parts))
 
-    def weighted(self, factors: Sequence[float]) -> Law:
+    def with_factors(self, factors: Sequence[float]) -> Law:
         """Return the law with each part times its own factor."""
         pairs = zip(self.parts, factors, strict=True)
         parts = (replace(part, block=part.block.times(factor)) for part, factor in pairs)
         return replace(self, parts=tuple(parts))
 
-    def having(self, key: str, value: float) -> Law:
+    weighted = FormerName("with_factors")
+
+    def with_number(self, key: str, value: float) -> Law:
         """Return the law with another value of one number.
 
         Its key is "delay"; "gain", a factor on the law; "hub_angle" or "hub_angle.gain", a factor on one signal;
@@ -311,6 +314,8 @@ class Law:
                 return replace(self, parts=tuple(parts))
         known = ["gain", "delay", *(part.signals[0] for part in self.parts if len(part.signals) == 1)]
         raise ParameterError(key="law", value=key, remedy=did_you_mean(key, known))
+
+    having = FormerName("with_number")
 
 
 def _parts_of(entries: Mapping[str, Any]) -> tuple[tuple[Part, ...], tuple[float, ...]]:

@@ -189,5 +189,5 @@ def with_damping(tables: dict[str, Any], ratio: float | None) -> dict[str, Any]:
     )
     # of bending alone
     C = reference_damping(arm, ratio)
-    found = listed_modes(modes(arm.having(damping=C), 1)).modes[-1].damping_ratio or ratio
+    found = listed_modes(modes(arm.with_numbers(damping=C), 1)).modes[-1].damping_ratio or ratio
     return tables | {"link": {"damping": float(f"{C * ratio / found:.4g}")} | tables["link"]}

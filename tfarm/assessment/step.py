@@ -302,9 +302,9 @@ def usual_duration(poles: Poles | None, chain: Chain) -> float:
     rise = chain.slew.rise_time
     if poles is None:
         return TRIAL_SLEWS * rise
-    sizes = abs(poles.moving)
+    sizes = abs(poles.nonzero)
     # a pole farther away than twice the first frequency is not the dominant one
-    near = poles.moving[sizes <= 2.0 * max(first_frequency(poles.loop.arm), sizes.min(initial=math.inf))]
+    near = poles.nonzero[sizes <= 2.0 * max(first_frequency(poles.loop.arm), sizes.min(initial=math.inf))]
     # at most 20 slews
     decay = max(abs(near.real).min(initial=math.inf), time_constants / (20.0 * rise))
     return float(f"{rise + time_constants / decay:.2g}")

@@ -58,7 +58,7 @@ def poles(
     """
     case, defaults = loop(arm)
     found = case.poles(count)
-    show(found.certified() if certify else found, defaults)
+    show(found.with_discs() if certify else found, defaults)
 
 
 @command(epilog="margins sasaki2012-lab --K1 0.3 --K2 0.3")
@@ -188,7 +188,7 @@ def map_plane(
         controller, _ = law_of_options(file, arm, {}, law)
     else:
         ranges = {name: typed[name] or usual for name, usual in zip(PLANE, ranges_of(arm), strict=True)}
-        controller = tfarm.default_gains(arm).having(ANGLE_GAIN, kp)
+        controller = tfarm.default_gains(arm).with_number(ANGLE_GAIN, kp)
     number = points or (60 if vary or law else 101)
     return controller, {name: cell_middles(low, high, number) for name, (low, high) in ranges.items()}
 
@@ -364,7 +364,7 @@ def simulate(
     animate: draw the arm in motion into this file, a GIF
     controller: tuner of `tfarm tune --save`: it sets K2, with its own K1
     """
-    from tfarm.dsp.results import simulated_run
+    from tfarm.dsp.results import simulate_scenario
 
     if animate is not None:
         require(animate.suffix.lower() == ".gif", "--animate", str(animate), "give a name that ends in .gif")
@@ -373,13 +373,13 @@ def simulate(
     defaults = None
     if controller is None:
         case, defaults = loop(arm)
-        found = simulated_run(case.through(chain(arm)), scenario, duration, **how)
+        found = simulate_scenario(case.through(chain(arm)), scenario, duration, **how)
     else:
         from tfarm.tuner import load_tuner, tuning
 
         subject = load_arm(arm, loop.keywords["theory"])
         tuner = load_tuner(controller)
-        found = tuning.controlled_run(subject, tuner, chain(arm), scenario, duration, **how)
+        found = tuning.simulate_tuner(subject, tuner, chain(arm), scenario, duration, **how)
     if mat is not None:
         write_file(mat, mat_content(matlab_signals(found), "column"), key="--mat")
     if animate is not None:

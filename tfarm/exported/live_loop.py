@@ -148,8 +148,8 @@ def _of_parts(case: Case) -> LiveNumbers:
     """Return the numbers of the page of a law of rational parts: each gain from a tenth to ten times its value."""
     law = case.law
     gains = {name: value for name, (_, value) in law.part_gains.items()}
-    corners = [case.under(law.weighted(each)) for each in product((0.1, 10.0), repeat=len(gains))]
-    unit = law.weighted([1.0 / value for value in gains.values()])
+    corners = [case.under(law.with_factors(each)) for each in product((0.1, 10.0), repeat=len(gains))]
+    unit = law.with_factors([1.0 / value for value in gains.values()])
     blocks = zip(gains, unit.signals, _blocks(unit), strict=True)
     return {
         **_of_any_law(case, corners, unit),
@@ -278,7 +278,7 @@ def theorem_numbers(arm: Arm, is_quiet: bool, are_gains: bool) -> LiveNumbers:
 
 def _stable_moments(arm: Arm) -> list[float | None]:
     """Return between which K2 no mode is driven by K1 > 0 without damping; None where no limit was found."""
-    found = windows_of(stability(Case(arm, default_gains(arm).having(MOMENT_GAIN, 0.0))), [MOMENT_GAIN])[
+    found = windows_of(stability(Case(arm, default_gains(arm).with_number(MOMENT_GAIN, 0.0))), [MOMENT_GAIN])[
         MOMENT_GAIN
     ]
     return [end if found.end(end) == "edge" else None for end in found.around or (-math.inf, math.inf)]

@@ -314,7 +314,9 @@ class ArmReport(NamedTuple):
     @property
     def bare(self) -> PageCase:
         """The default gains without that of the root moment."""
-        return self.case_of(GivenLaw(self.gains.having(MOMENT_GAIN, 0.0)), f"{MOMENT_GAIN} = 0", "without")
+        return self.case_of(
+            GivenLaw(self.gains.with_number(MOMENT_GAIN, 0.0)), f"{MOMENT_GAIN} = 0", "without"
+        )
 
     @property
     def has_loop(self) -> bool:

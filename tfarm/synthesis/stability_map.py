@@ -78,7 +78,7 @@ def stable_regions(case: Case) -> StableRegions:
     arm = case.arm
     # at C = 0 with a little damping too
     dampings = (arm.damping,) if arm.damping else (1e-4, 1e-6, 0.0)
-    loops = [sampled_verdict(case.on(arm.having(damping=C))).full for C in dampings]
+    loops = [sampled_verdict(case.on(arm.with_numbers(damping=C))).full for C in dampings]
     ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
     ends = ends[ends > 0]
     ends = ends[np.diff(ends, prepend=0.0) > 1e-3 * ends]
