@@ -1,5 +1,7 @@
 """Gains of the grade good: the region of models on a grid against the result cards of the exact loops."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from tfarm.synthesis.good_region import good_region
 CHAIN = Chain()
 
 
+@cache
 def region_of(name):
     arm = tfarm.load(name)
     x = rate_axis(arm)
