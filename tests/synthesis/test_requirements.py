@@ -17,7 +17,7 @@ from tfarm.arm.weights import weights_of
 from tfarm.arm.writing import save_law
 from tfarm.assessment.signal_figures import PARTS
 from tfarm.case import Case
-from tfarm.dsp import Actuator, Chain, Sampling, pulse_transfer
+from tfarm.dsp import Actuator, Chain, Converters, Sampling, pulse_transfer
 from tfarm.schema.quantities import to_dict
 from tfarm.synthesis.goals import Goal, check, exact_values
 from tfarm.synthesis.judge import judge_of, slowest_allowed
@@ -95,6 +95,28 @@ def test_requirements_of_a_file_are_read_and_its_errors_name_it(tmp_path):
     with pytest.raises(tfarm.ParameterError, match=r"arm\.toml.*requirements\.PM"):
         load_requirements(file)
     assert load_requirements("sasaki2012-lab") is None
+
+
+CHAINS = [
+    Chain(converters=Converters(hub_rate="difference")),
+    Chain(sampling=Sampling(period=0.005, delay_samples=0.3)),
+]
+
+
+@pytest.mark.parametrize("chain", CHAINS, ids=["difference", "delay"])
+def test_the_norm_on_the_model_is_that_of_what_the_controller_reads(chain):
+    """Of PD with a given Kp, the angle also by way of its difference; at most 0.1 % below the certified bound."""
+    form = structure_of("PD", LAB, Kp=0.5, modes=2, period=T, bounds={})
+    weights = weights_of(WEIGHTS | {"T": 0.3})
+    model = replace(judge_of(LAB, LAB, chain, "damping", form.signals, 2, 8).model, weights=weights)
+    coefficients = np.array([[0.5, 1.0, 2.0]])
+    entries = form.entries(coefficients)
+    found = LoopMeasures(model, entries, model.poles(entries), chain.sampling.period).stacked_norm()
+    for K1, value in zip(coefficients[0], found, strict=True):
+        bound = exact_values(Case(LAB, HubFeedback(K1=K1, K2=0.0, Kp=0.5), chain), None, weights).sampled[
+            "stacked_norm"
+        ]
+        assert 0.998 * bound <= value <= bound
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -104,12 +104,16 @@ class LoopMeasures:
         On the grid, about the poles, and between the points of both where a parabola has its peak.
         """
         laws = len(self.poles)
-        # one of each pair of poles; the others, and those with more damping, have no narrow peak
         s = self.model.in_s(self.poles)
-        is_narrow = (s.imag > 0) & (s.imag < 3.0) & (s.real > -0.1 * s.imag)
-        s = np.where(is_narrow, s, -0.1 + 1j)
-        s = np.take_along_axis(s, np.argsort(~is_narrow, axis=1)[:, : is_narrow.sum(axis=1).max() + 1], 1)
-        near = s.imag[..., None] + s.real[..., None] * np.linspace(2, -2, 9)
+        size = abs(s)
+        width = np.minimum(abs(s.real), 0.45 * size)
+        # one of each pair of poles, below half the sampling rate
+        counts = (s.imag >= 0) & (size + 2 * width < np.pi) & (width > 0)
+        size = np.where(counts, size, 1.0)
+        width = np.where(counts, width, 0.1)
+        first = np.argsort(~counts, axis=1)[:, : max(1, counts.sum(axis=1).max())]
+        near = size[..., None] + width[..., None] * np.linspace(-2, 2, 9)
+        near = np.take_along_axis(near, first[..., None], 1)
         angles = self.model.angles
         on_grid = self._weighted(self.L, angles)
         about = self._weighted(None, near.reshape(laws, -1))
@@ -124,10 +128,13 @@ class LoopMeasures:
         assert model.weights is not None
         if L is None:
             L = model.loop(self.entries, angles)
-        K = np.stack([each for _, each in model.controllers(self.entries, angles)], axis=-2)
+        K = dict(model.controllers(self.entries, angles))
+        if model.rate is not None:
+            # the controller reads the angle in its place
+            K["hub_angle"] = K.get("hub_angle", 0.0) + model.rate(np.exp(1j * angles)) * K.pop("hub_rate")
         sizes = weight_sizes(model.weights, angles.ravel() / self.period, self.period)
         own = {name: size.reshape(angles.shape) for name, size in sizes.items()}
-        return weighted_sizes(L, K, own)[STACKED]
+        return weighted_sizes(L, np.stack(np.broadcast_arrays(*K.values()), axis=-2), own)[STACKED]
 
     def least_damping(self) -> Real:
         """Return the least damping ratio of the oscillating poles (laws,)."""

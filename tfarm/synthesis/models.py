@@ -44,8 +44,8 @@ class DesignModel:
     `speed` [1/s] is c, the unit of a law's s.  `grid` gives angles (m,) of the circle [rad] or frequencies [rad/s], and
     `response` the signals (signals, k) at k of them.  The damping of poles counts below `band` [rad/s], without one
     each near the poles of open-loop modes `higher`, the highest first.  `last` is the state with the input of the last
-    sample; `own_moment` (n,) is the row of the arm's own root moment, before the anti-alias filter; `weights` are those
-    of a norm.
+    sample; `own_moment` (n,) is the row of the arm's own root moment, before the anti-alias filter.  A `rate` is the
+    filtered difference of the angle, which it is a factor of; `weights` are those of a norm.
     """
 
     plant: Matrices
@@ -58,9 +58,8 @@ class DesignModel:
     higher: tuple[complex, ...]
     last: int
     own_moment: Real
+    rate: Callable[[Complex], Complex] | None = None
     weights: Weights | None = None
-
-    # ------------------------------------------------------------ laws in states
 
     def states(self, entries: Sequence[Entry]) -> Matrices:
         """Return A (laws, k, k), B (laws, k, signals), C (laws, 1, k), D (laws, 1, signals) of laws."""
@@ -116,8 +115,6 @@ class DesignModel:
         found[:, n:] += Bk @ read
         return found
 
-    # ------------------------------------------------------------ poles
-
     def poles(self, entries: Sequence[Entry], share: float = 1.0) -> Complex:
         """Return closed-loop poles (laws, n), of a matrix that is not finite far outside."""
         found = self.closed_matrices(self.states(entries), share)
@@ -138,8 +135,6 @@ class DesignModel:
         if self.period is None:
             return poles
         return np.log(np.where(poles == 0, np.e, poles))
-
-    # ------------------------------------------------------------ loop function
 
     @cached_property
     def angles(self) -> Real:
@@ -224,6 +219,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         missing = damped + ("hub_angle" not in signals)
     gone = range(first, first + missing)
     response: Callable[[Complex], Complex] = pulse
+    rate = None
     if by_difference:
         a = np.exp(-chain.converters.rate_filter * T)
         n = read.index("hub_angle")
@@ -231,9 +227,12 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         A, B, C = difference_rate(A, B, C, n, row, a, T, angle)
         own = np.append(own, 0.0)
 
+        def rate(z: Complex) -> Complex:
+            return (1 - a) / T * (z - 1) / (z - a)
+
         def response(z: Complex) -> Complex:
             found = pulse(z)
-            found[row] = (1 - a) / T * (z - 1) / (z - a) * found[n]
+            found[row] = rate(z) * found[n]
             return found
 
     A = np.delete(np.delete(A, gone, 0), gone, 1)
@@ -253,6 +252,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         tuple(complex(each.real, abs(each.imag)) for each in higher),
         first + 2 - missing,
         np.delete(own, gone),
+        rate,
     )
 
 
