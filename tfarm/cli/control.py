@@ -18,6 +18,7 @@ from tfarm.cli.options import (
     File,
     LawFile,
     TheoryName,
+    WeightEntries,
     chain_of_options,
     interval,
     law_of_options,
@@ -25,7 +26,6 @@ from tfarm.cli.options import (
     load_driven_loop,
     load_loop,
     name_and,
-    numbers,
     refuse,
     without_none,
 )
@@ -242,20 +242,11 @@ def sampled(
     show(found, defaults, summary=case.card(at_samples=found))
 
 
-def weight_entry(text: str) -> tuple[Any, ...]:
-    """Return numerator and denominator of NUM/DEN, coefficients in descending powers of s; of NUM over 1."""
-    num, _, den = text.partition("/")
-    coefficients = numbers("coefficients NUM or NUM/DEN in descending powers of s, such as 0.5,2/1,0.02")
-    return coefficients(num), coefficients(den or "1")
-
-
 @command(epilog="norm sasaki2012-lab --K1 3 --K2 0.15 --weight S=0.5,2/1,0.02 --weight KS=0.1")
 def norm(
     *,
     arm: ArmName,
-    weight: Annotated[
-        list[Any] | None, typer.Option(parser=name_and(weight_entry), metavar="NAME=NUM/DEN")
-    ] = None,
+    weight: WeightEntries = None,
     loop: Any = load_loop,
     chain: Any = chain_of_options,
     show: Any = emit_record,
@@ -264,9 +255,6 @@ def norm(
 
     They are those of the sampled loop, and the bounds hold between frequencies too.  The weights are those of
     [weights] in the controller's file, else in the arm's; without any S and T have the weight 1.
-
-    Options:
-    weight: weight on S, KS or T, coefficients in descending powers of s; may be repeated, and replaces those of a file
     """
     from tfarm.arm.law_tables import load_weights
 

@@ -22,6 +22,7 @@ from tfarm.cli.options import (
     ModeCount,
     Png,
     TheoryName,
+    WeightEntries,
     chain_of_options,
     gains_of_options,
     interval,
@@ -70,6 +71,7 @@ def design(
     study: Annotated[Path | None, typer.Option("--study", metavar="FILE", exists=True)] = None,
     posterior: Annotated[Path | None, typer.Option("--posterior", metavar="FILE", exists=True)] = None,
     fresh: int = 64,
+    weight: WeightEntries = None,
     trade_off: Annotated[bool, typer.Option("--trade-off")] = False,
     save: File = None,
     theory: TheoryName = None,
@@ -82,8 +84,8 @@ def design(
     The sampling period is that of the file, or else 10 ms.
 
     Options:
-    objective: settling, time-constant, torque, Ms ...; without requirements: damping, margin, sensitivity, delay,
-        residual or cost (of the tuner)
+    objective: settling, time-constant, torque, Ms, norm, bandwidth^-1 ...; without requirements: damping, margin,
+        sensitivity, delay, residual or cost (of the tuner)
     require: requirements such as "GM>=6, PM>=45, Ms<=2, delay>=1, damping>=2%, torque<=5, settling<=1.5"
     study: file of a study: requirements hold on the worst arms of a pool drawn from it
     posterior: posterior of a fit, likewise
@@ -94,13 +96,13 @@ def design(
     over: range of a number of the arm, such as payload.mass=0.1,0.5; up to four: corners, and a search inside
     save: write the law to this TOML file, for --law
     """
+    from tfarm.arm.law_tables import load_weights
     from tfarm.arm.writing import save_law
     from tfarm.synthesis.requirements import load_requirements
 
     subject = load_arm(arm, theory)
-    wanted = load_requirements(arm) if require is None else require
     options: dict[str, Any] = {
-        "require": wanted,
+        "require": load_requirements(arm) if require is None else require,
         "structure": structure,
         "modes": modes,
         "chain": chain(arm),
@@ -109,6 +111,7 @@ def design(
         RATE_GAIN: k1,
         MOMENT_GAIN: k2,
         ANGLE_GAIN: kp,
+        "weights": dict(weight or ()) or load_weights(arm),
     }
     if trade_off:
         others = {"range": over, "study": study, "posterior": posterior, "continuous": continuous}
@@ -395,10 +398,7 @@ def study_arguments(
 
     # an arm's file names no arm
     if "arm" in file.tables:
-        refuse(
-            typed,
-            f"the study is that of {file.name}; leave this out",
-        )
+        refuse(typed, f"the study is that of {file.name}; leave this out")
         return load_study(file), None
     case, defaults = loop(file)
     known = {key: value for key, value in typed.items() if value is not None}

@@ -15,26 +15,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import TWO_GAINS, AnyLaw, Arm, must_turn
+from tfarm.arm import TWO_GAINS, AnyLaw, Arm, Law, must_turn
 from tfarm.arm.stages import Consumer
+from tfarm.arm.weights import USUAL_WEIGHTS, Weights, weights_of
 from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import arm_under_chain
+from tfarm.dsp.simulate import quantisers
 from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.errors import require as require_that
 from tfarm.loop.continuous import ContinuousLoop
+from tfarm.loop.norms import weight_sizes
 from tfarm.loop.sampled_brief import sampled_brief
 from tfarm.loop.stability import stability
 from tfarm.records import frozen
 from tfarm.synthesis.drawn import AnyStudy, drawn_arms, verify, violation_on
+from tfarm.synthesis.goals import norm_bound
 from tfarm.synthesis.judge import LOST, OBJECTIVES, TOO_SLOW, Judge, judge_of, model_sizes
-from tfarm.synthesis.required import (
-    RequiredLaw,
-    RequirementTask,
-    why_none,
-)
-from tfarm.synthesis.requirements import MEASURES, RequirementList, measure_named, requirements_of
+from tfarm.synthesis.required import RequiredLaw, RequirementTask, why_none
+from tfarm.synthesis.requirements import MEASURES, NORM, RequirementList, measure_named, requirements_of
 from tfarm.synthesis.result import Design, OnArm
 from tfarm.synthesis.search import Search, Worst, flat_part, search
 from tfarm.synthesis.stability_map import recommended_gains
@@ -105,6 +105,7 @@ def design(
     study: AnyStudy | None = None,
     posterior: str | os.PathLike[str] | None = None,
     fresh: int = 64,
+    weights: Mapping[str, Any] | Weights | None = None,
 ) -> Design:
     """Return the law of a structure with the best value of an objective in the sampled loop of a chain (default 10 ms).
 
@@ -133,6 +134,9 @@ def design(
     `study` is the file of a study, or its table of distributions, `posterior` that of a fit: requirements are met on
     the worst arms of a pool drawn from them, and `fresh` further arms examine the law, `.verification`.
 
+    `weights` of S, KS and T are those of `tfarm.norm`, by default 1 of S and T: "norm" is the H-infinity norm of all
+    weighted functions as a column, on the exact loop its certified upper bound.
+
     Raises ParameterError for options that exclude each other, ConvergenceError where no
     stable law is found.
     """
@@ -144,7 +148,7 @@ def design(
     ends = {key: (float(low), float(high)) for key, (low, high) in (ranges or {}).items()}
     box = ArmBox(arm, ends) if ends else None
     options = _Options(
-        arm, structure, {"K1": K1, "K2": K2}, Kp, modes, chain or Chain(), tuple(also), box, progress
+        arm, structure, {"K1": K1, "K2": K2}, Kp, modes, chain or Chain(), tuple(also), box, progress, weights
     )
     is_of_drawn = study is not None or posterior is not None
     remedy = "requirements hold on arms of a study or posterior: name --minimise by one of their quantities"
@@ -156,7 +160,9 @@ def design(
             must_turn(arm)
         arms, form = options.arms_and_form(is_angle_free=False)
         task = _DesignTask(arm, str(objective), form, modes, options.chain, continuous, options.tell)
-        return task.design(*for_the_worst(arms, box, task.find, task.score_on, options.tell))
+        return options.with_norm(
+            task.design(*for_the_worst(arms, box, task.find, task.score_on, options.tell))
+        )
     search_for, arms = options.task(objective, require)
     drawn = None
     worst = search_for.score_on
@@ -172,7 +178,7 @@ def design(
     if found.violation > 0:
         conflicts = search_for.conflicts(found, named)
         alternatives = _alternatives(options, search_for, named)
-    return replace(
+    record = replace(
         _record(search_for, found, named, case, is_continuous=False),
         requirements=found.checked,
         sensitivities=tuple(search_for.sensitivities(found)),
@@ -180,6 +186,7 @@ def design(
         conflicts=conflicts,
         alternatives=alternatives,
     )
+    return replace(options, weights=search_for.weights).with_norm(record)
 
 
 def _find_or_good_gains(
@@ -226,6 +233,7 @@ def trade_off(
     progress: Tell | None = None,
     also: Sequence[Arm] = (),
     number: int = 12,
+    weights: Mapping[str, Any] | Weights | None = None,
 ) -> TradeOff:
     """Return the front of speed against robustness: designs from 0.4 to 1.9 times the limits of the grade good.
 
@@ -233,8 +241,9 @@ def trade_off(
     Requirements of other quantities than gain, phase and delay margin and Ms hold at every one of the `number` designs.
     Raises ParameterError as `design` does, ConvergenceError where no law is stable on all arms.
     """
+    bounds = {"K1": K1, "K2": K2}
     options = _Options(
-        arm, structure, {"K1": K1, "K2": K2}, Kp, modes, chain or Chain(), tuple(also), None, progress
+        arm, structure, bounds, Kp, modes, chain or Chain(), tuple(also), None, progress, weights
     )
     return front(*options.task(objective or "time-constant", require), number)
 
@@ -252,6 +261,7 @@ class _Options:
     also: tuple[Arm, ...]
     box: ArmBox | None
     progress: Tell | None
+    weights: Mapping[str, Any] | Weights | None
 
     def tell(self, text: str) -> None:
         """Pass a line of progress on."""
@@ -261,7 +271,7 @@ class _Options:
     def form(self, structure: str, *, is_angle_free: bool) -> Structure:
         """Return a structure with what is given of it, if it is the one named."""
         is_own = structure == self.structure
-        return structure_of(
+        found = structure_of(
             structure,
             self.arm,
             Kp=self.Kp if is_own else 0.0,
@@ -269,6 +279,16 @@ class _Options:
             period=self.chain.sampling.period,
             bounds=self.bounds if is_own else {},
             is_angle_free=is_angle_free,
+        )
+        *_, highest = quantisers(self.chain)[-1]
+        return replace(found, is_limited=bool(np.isfinite(highest)))
+
+    def with_norm(self, found: Design) -> Design:
+        """Return a design with the norm of its law, where there are weights."""
+        if self.weights is None:
+            return found
+        return replace(
+            found, norm=norm_bound(Case(self.arm, found.law, self.chain), weights_of(self.weights))
         )
 
     def arms_and_form(self, *, is_angle_free: bool) -> tuple[list[NamedArm], Structure]:
@@ -297,7 +317,16 @@ class _Options:
         if MEASURES[minimised].of_slew or any(each.measure.of_slew for each in limits):
             must_turn(self.arm)
         arms, form = self.arms_and_form(is_angle_free=True)
-        return RequirementTask(self.arm, limits, minimised, form, self.modes, self.chain, self.tell), arms
+        names = {minimised, *(each.name for each in limits)}
+        if "peak_input" in names:
+            form = replace(form, is_limited=True)
+        weights = None
+        if NORM in names or self.weights is not None:
+            weights = weights_of(USUAL_WEIGHTS if self.weights is None else self.weights)
+            # those of another period are refused before any work
+            weight_sizes(weights, np.ones(1), self.chain.sampling.period)
+        task = RequirementTask(self.arm, limits, minimised, form, self.modes, self.chain, self.tell, weights)
+        return task, arms
 
 
 def _other_forms(options: _Options) -> Iterator[Structure]:
@@ -418,11 +447,14 @@ def _record(
         on_arms.append(OnArm(name, numbers, value, stability(on_arm), sampled_brief(on_arm)))
     at_ends = own.at_ends(x)
     physical = own.ends(physical=True)
+    coefficients = own.by_name(own.coefficients(x).tolist())
+    if isinstance(law, Law) and law.anti_windup:
+        coefficients["anti_windup_s"] = law.anti_windup
     return Design(
         objective=task.objective,
         structure=own.name,
         law=law,
-        coefficients=own.by_name(own.coefficients(x).tolist()),
+        coefficients=coefficients,
         value=objective.worst([each.value for each in on_arms]),
         verdict=on_arms[0].verdict,
         bounds={each.name: each.bounds for each in own.free},

@@ -184,12 +184,12 @@ def violation_by_models(judge: Judge, choice: RequiredLaw) -> float:
     entries = judge.entries(choice.law)
     wanted = choice.goal.requirements
     found = [0.0] if any(each.measure.of_slew for each in wanted) else []
-    for model in (judge.model, *judge.also[:1]):
+    for number, model in enumerate((judge.model, *judge.also[:1])):
         loop = LoopMeasures(model, entries, model.poles(entries), judge.chain.sampling.period)
         if model.growth(loop.poles).max() >= 0:
             return np.inf
         found += [
-            float(each.violations(loop.of(each.name))[0]) for each in wanted if not each.measure.of_slew
+            float(each.violations(loop.of(each.name))[0]) for each in wanted if each.measure.is_of(number)
         ]
     return max(found)
 

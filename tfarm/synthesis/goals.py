@@ -19,19 +19,25 @@ import numpy as np
 from scipy.optimize import minimize
 
 from tfarm.arm import AnyLaw, Arm
+from tfarm.arm.weights import Weights
 from tfarm.arrays import LEAST_SIZE, Real
-from tfarm.assessment.card import LoopCard, loop_card
+from tfarm.assessment.card import LoopCard, analysis_of, graded_arm, loop_card
+from tfarm.assessment.signal_figures import PARTS
 from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import arm_under_chain
+from tfarm.dsp.stages import admit_case
 from tfarm.errors import ConvergenceError
+from tfarm.loop.loop_margins import bandwidth
+from tfarm.loop.norms import NormBound, norm
+from tfarm.loop.sampled_verdict import SAMPLED_LOOP
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.gains import turning_inertia
 from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.judge import LOST, slowest_allowed
 from tfarm.synthesis.measures import LoopMeasures
-from tfarm.synthesis.requirements import Requirement
+from tfarm.synthesis.requirements import NORM, Requirement
 from tfarm.synthesis.slew_measures import SlewMeasures
 from tfarm.synthesis.structures import Entry
 from tfarm.synthesis.worst_case import NamedArm
@@ -50,6 +56,7 @@ class Goal:
 
     `shifts` tighten each requirement of the sampled (0) and of the continuous-time loop (1) on the model; `delays` are
     further delays [periods] with which the sampled loop has to be stable.  A violation counts by the `weight`.
+    `weights` are those of a norm.
     """
 
     requirements: tuple[Requirement, ...]
@@ -57,6 +64,7 @@ class Goal:
     shifts: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     delays: tuple[float, ...] = ()
     weight: float = WEIGHT
+    weights: Weights | None = None
 
     is_negated = False
     of_slew = False
@@ -101,7 +109,7 @@ class Goal:
             loops.append(LoopMeasures(other, sampled.entries, poles, sampled.period))
         for number, loop in enumerate(loops):
             for each, shift in self.shifted(number):
-                if each.measure.of_slew:
+                if not each.measure.is_of(number):
                     continue
                 violation = each.violations(loop.of(each.name)) + shift
                 if each.name == "delay_margin_periods" and loop is sampled and judge.delayed:
@@ -137,7 +145,7 @@ class Goal:
         score = float((slowness(judge, entries) + self._penalty(judge, measures))[0])
         speed = float(measures.dominant_time_constant(first_frequency(judge.arm))[0])
         figures = slew.of(law)
-        if self.minimised == "settling_time_s":
+        if self.minimised.endswith("settling_time_s"):
             # a tip that does not settle in the longest record: of such laws the fastest is the best
             settled = min(figures[self.minimised], 100.0 * speed)
             score += float(np.log(settled + SHARE_OF_SPEED * speed))
@@ -195,7 +203,9 @@ def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real) -> Real:
     """Return the point of a simplex that begins at x, with the slew simulated on every arm."""
     # modes of a slew that is simulated hundreds of times
     modes = 8
-    slews = [SlewMeasures(judge.arm, judge.known, judge.chain, modes) for judge in judges]
+    names = (goal.minimised, *(each.name for each in goal.requirements))
+    parts = tuple(each for each in PARTS if any(name.startswith(f"{each}.") for name in names))
+    slews = [SlewMeasures(judge.arm, judge.known, judge.chain, modes, parts) for judge in judges]
 
     def score(at: Real) -> float:
         law = form.record_at(at)
@@ -229,7 +239,9 @@ def card_values(card: LoopCard) -> dict[str, float]:
         ratio = float(damping.ratio)
     return {
         "gain_margin_db": -np.inf if None in gain else min(cast("list[float]", gain)),
+        "gain_reduction_db": _or(card.gain_reduction.value, -np.inf),
         "phase_margin_deg": _or(card.phase_margin.value, -np.inf),
+        "delay_margin_ms": _or(card.delay_margin.value, -np.inf),
         "delay_margin_periods": _or(card.delay_margin_periods, -np.inf),
         "peak_sensitivity": _or(card.peak_sensitivity.value, np.inf),
         "disk_margin": _or(card.disk_margin, -np.inf),
@@ -242,16 +254,41 @@ def _or(value: float | None, other: float) -> float:
     return other if value is None else float(value)
 
 
+@lru_cache(64)
+def norm_bound(case: Case, weights: Weights) -> NormBound:
+    """Return the norm of the column of all weighted functions of a sampled loop, with its certified bound."""
+    case = admit_case(SAMPLED_LOOP, case)
+    return norm(case.arm, case.law, case.chain, weights=weights).bounds[-1]
+
+
+def _bandwidths(name: str, case: Case) -> dict[str, float]:
+    """Return the bandwidth of a loop, and its inverse, of the arm that the card grades."""
+    case = admit_case(SAMPLED_LOOP, case)
+    verdict = analysis_of(name, case.on(graded_arm(case.arm)[0])).verdict
+    found = bandwidth(verdict.full, verdict.frequencies)
+    return {"bandwidth_rad_s": found, "inverse_bandwidth_s": 1 / found}
+
+
 @lru_cache(256)
-def exact_values(case: Case, known: Arm | None) -> LoopValues:
-    """Return the measures of both loops of a case by the result card, and of the slew for an arm `known`, if any."""
+def exact_values(case: Case, known: Arm | None, weights: Weights | None = None) -> LoopValues:
+    """Return the measures of both loops of a case by the result card.
+
+    Those of the slew are for an arm `known`, if any, and the norm is the upper bound with the weights, if any.
+    """
     found: list[dict[str, float] | None] = []
     for name in ("sampled", "continuous"):
         if name == "continuous" and case.law.is_discrete:
             found.append(None)
             continue
         try:
-            found.append(card_values(loop_card(name, case)))
+            card = loop_card(name, case)
+            values = card_values(card)
+            if card.stability == "stable":
+                values |= _bandwidths(name, case)
+                if weights is not None and name == "sampled":
+                    bound = norm_bound(case.on(graded_arm(case.arm)[0]), weights)
+                    values[NORM] = bound.value if bound.upper is None else bound.upper
+            found.append(values)
         except ConvergenceError:
             found.append({})
     sampled = found[0] or {}
@@ -283,13 +320,13 @@ def check(goal: Goal, known: Arm, chain: Chain, named: NamedArm, law: AnyLaw) ->
 
     These are of the arm and the chain as they are given; slews are those of the arm `known`.
     """
-    values = exact_values(Case(named.arm, law, chain), known if goal.by_simulation else None)
+    values = exact_values(Case(named.arm, law, chain), known if goal.by_simulation else None, goal.weights)
     rows = []
     violations = np.full((2, len(goal.requirements)), -1.0)
     for n, each in enumerate(goal.requirements):
         shown = [None if of is None else of.get(each.name) for of in values]
         for loop, value in enumerate(shown):
-            if values[loop] is not None and not (loop and each.measure.of_slew):
+            if values[loop] is not None and (not loop or each.measure.is_of(loop)):
                 violations[loop, n] = np.inf if value is None else each.violation(value)
         rows.append(Checked(str(each), named.name, shown[0], shown[1], float(violations[:, n].max())))
     return rows, violations

@@ -13,7 +13,7 @@ A is that of the closed loop, r the feed-forward, w the input, D_k the direct te
 reference has states: its angle, rate and acceleration, constant over each half of the slew.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -22,6 +22,7 @@ from scipy.linalg import expm
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices
+from tfarm.arm.weights import Weights
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, Scenario, scenario
 from tfarm.dsp.pulse import PulseTransfer
@@ -43,7 +44,8 @@ class DesignModel:
     `speed` [1/s] is c, the unit of a law's s.  `grid` gives angles (m,) of the circle [rad] or frequencies [rad/s], and
     `response` the signals (signals, k) at k of them.  The damping of poles counts below `band` [rad/s], without one
     each near the poles of open-loop modes `higher`, the highest first.  `last` is the state with the input of the last
-    sample; `own_moment` (n,) is the row of the arm's own root moment, before the anti-alias filter.
+    sample; `own_moment` (n,) is the row of the arm's own root moment, before the anti-alias filter.  A `rate` is the
+    filtered difference of the angle, which it is a factor of; `weights` are those of a norm.
     """
 
     plant: Matrices
@@ -56,8 +58,8 @@ class DesignModel:
     higher: tuple[complex, ...]
     last: int
     own_moment: Real
-
-    # ------------------------------------------------------------ laws in states
+    rate: Callable[[Complex], Complex] | None = None
+    weights: Weights | None = None
 
     def states(self, entries: Sequence[Entry]) -> Matrices:
         """Return A (laws, k, k), B (laws, k, signals), C (laws, 1, k), D (laws, 1, signals) of laws."""
@@ -113,8 +115,6 @@ class DesignModel:
         found[:, n:] += Bk @ read
         return found
 
-    # ------------------------------------------------------------ poles
-
     def poles(self, entries: Sequence[Entry], share: float = 1.0) -> Complex:
         """Return closed-loop poles (laws, n), of a matrix that is not finite far outside."""
         found = self.closed_matrices(self.states(entries), share)
@@ -136,8 +136,6 @@ class DesignModel:
             return poles
         return np.log(np.where(poles == 0, np.e, poles))
 
-    # ------------------------------------------------------------ loop function
-
     @cached_property
     def angles(self) -> Real:
         """The grid (m,)."""
@@ -149,23 +147,26 @@ class DesignModel:
         return self.response(self.angles)
 
     def loop(self, entries: Sequence[Entry], angles: Real | None = None) -> Complex:
-        """Return L (laws, m) at the model's own angles, or at others."""
+        """Return L (laws, m) at the model's own angles, or at others (m,) or (laws, m)."""
         q = self.angles
         response = self.responses
         if angles is not None:
             q = np.asarray(angles)
-            response = self.response(q)
-        s = 1j * q
+            response = self.response(q.ravel()).reshape(-1, *q.shape)
+        total = 0.0
+        for signal, through in self.controllers(entries, q):
+            total = total + through * response[self.signals.index(signal)]
+        return np.asarray(total)
+
+    def controllers(self, entries: Sequence[Entry], angles: Real) -> Iterator[tuple[str, Complex]]:
+        """Yield each signal with its entry of the laws (laws, m) at angles."""
+        s = 1j * angles
         if self.period is not None:
             z = np.exp(s)
             # at z = -1 Tustin's s is infinite
             s = self.speed * (z - 1) / np.where(abs(z + 1) < 1e-12, 1e-12, z + 1)
-        total = 0.0
         for signal, num, den in entries:
-            # (laws, m)
-            through = np.polyval(num[:, :, None], s) / np.polyval(den[:, :, None], s)
-            total = total + through * response[self.signals.index(signal)]
-        return np.asarray(total)
+            yield signal, np.polyval(num[:, :, None], s) / np.polyval(den[:, :, None], s)
 
 
 def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int, speed: float) -> DesignModel:
@@ -218,6 +219,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         missing = damped + ("hub_angle" not in signals)
     gone = range(first, first + missing)
     response: Callable[[Complex], Complex] = pulse
+    rate = None
     if by_difference:
         a = np.exp(-chain.converters.rate_filter * T)
         n = read.index("hub_angle")
@@ -225,9 +227,12 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         A, B, C = difference_rate(A, B, C, n, row, a, T, angle)
         own = np.append(own, 0.0)
 
+        def rate(z: Complex) -> Complex:
+            return (1 - a) / T * (z - 1) / (z - a)
+
         def response(z: Complex) -> Complex:
             found = pulse(z)
-            found[row] = (1 - a) / T * (z - 1) / (z - a) * found[n]
+            found[row] = rate(z) * found[n]
             return found
 
     A = np.delete(np.delete(A, gone, 0), gone, 1)
@@ -247,6 +252,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         tuple(complex(each.real, abs(each.imag)) for each in higher),
         first + 2 - missing,
         np.delete(own, gone),
+        rate,
     )
 
 

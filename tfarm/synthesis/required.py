@@ -16,6 +16,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm
+from tfarm.arm.weights import Weights
 from tfarm.arrays import Real
 from tfarm.assessment.card import graded_arm
 from tfarm.case import Case
@@ -86,11 +87,12 @@ class RequirementTask:
     modes: int
     chain: Chain
     tell: Tell
+    weights: Weights | None = None
 
     @property
     def goal(self) -> Goal:
         """The goal without shifts."""
-        return Goal(self.requirements, self.minimised)
+        return Goal(self.requirements, self.minimised, weights=self.weights)
 
     def judge(self, on: Arm, goal: Goal, step: int) -> Judge:
         """Return the judge of laws on an arm by the models of a step of their sizes, with the delays required.
@@ -106,6 +108,8 @@ class RequirementTask:
             most = model_sizes(on, self.chain, self.modes, continuous=False)[0]
             own = judge_of(on, self.arm, self.chain, goal, self.form.signals, self.modes, most)
             found = replace(found, also=(*found.also, own.model, *own.also))
+        if goal.weights is not None:
+            found = replace(found, model=replace(found.model, weights=goal.weights))
         sampling = found.chain.sampling
         delays = list(goal.delays)
         for each, shift in goal.shifted(0):
@@ -218,11 +222,11 @@ class RequirementTask:
     def values_on(self, on: Arm, law: AnyLaw) -> dict[str, float]:
         """Return the exact measures of a law on an arm, of the sampled loop, with its slew where that is minimised."""
         known = self.arm if MEASURES[self.minimised].of_slew else None
-        return exact_values(Case(on, law, self.chain), known).sampled
+        return exact_values(Case(on, law, self.chain), known, self.weights).sampled
 
     def value_on(self, judge: Judge, on: Arm, law: AnyLaw) -> float:
         """Return the quantity of a law that is minimised, on an arm of a judge."""
-        return self.values_on(on, law)[self.minimised]
+        return self.values_on(on, law).get(self.minimised, np.inf)
 
     def meets(self, named: Sequence[NamedArm]) -> bool:
         """Return whether a law of the structure meets all requirements on all arms."""
@@ -267,7 +271,7 @@ class RequirementTask:
             entries = form.entries(c)
             loop = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
             for each in self.requirements:
-                if each.measure.of_slew:
+                if not each.measure.is_of(0):
                     continue
                 values = loop.of(each.name)
                 if np.isfinite(values).all():

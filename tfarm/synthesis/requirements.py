@@ -20,8 +20,9 @@ import numpy as np
 from tfarm.arm.reading import AnyFile, load_tables
 from tfarm.arrays import Real
 from tfarm.assessment.card import GRADE_LIMITS
-from tfarm.errors import ParameterError, must_be_known, name_file, require
-from tfarm.schema import Quantity
+from tfarm.assessment.signal_figures import LoopResponse, SignalFigures
+from tfarm.errors import ParameterError, did_you_mean, name_file, require
+from tfarm.schema import Quantity, quantities
 
 Sense = Literal[">=", "<="]
 
@@ -29,7 +30,8 @@ Sense = Literal[">=", "<="]
 class Measure(NamedTuple):
     """A quantity that a requirement limits: its title, unit, short forms, and the sense of a good value.
 
-    `scale` is the size [unit] of a violation of 1 where the limit is 0; a percentage is read as a share.
+    `scale` is the size [unit] of a violation of 1 where the limit is 0; a percentage is read as a share.  Those of the
+    slew, and `of_samples`, are of the sampled loop alone.
     """
 
     title: str
@@ -39,20 +41,65 @@ class Measure(NamedTuple):
     scale: float = 1.0
     of_slew: bool = False
     is_share: bool = False
+    of_samples: bool = False
+
+    def is_of(self, loop: int) -> bool:
+        """Whether the models of the sampled (0) or the continuous-time loop (1) have it."""
+        return not (self.of_slew or (self.of_samples and loop))
+
+
+INPUT_UNIT = "of the arm"
+NORM = "stacked_norm"
+
+
+def _figures() -> dict[str, Measure]:
+    """Return the figures of `tfarm step` in the slew that are small of a good law, by their names there."""
+    of_figures = quantities(SignalFigures)
+    units = {"hub": "rad", "tip": "m", "root_moment": "N m", "torque": INPUT_UNIT}
+    names = ["peak", "settling_time", "at_rest_after", "residual_rms"]
+    # of a signal with a reference
+    followed = ["rise_time", "overshoot", "steady_state_error"]
+    found = {}
+    for part, unit in units.items():
+        for name in names + followed * (part in ("hub", "tip")):
+            of = of_figures[name]
+            title = f"{of.label}, {quantities(LoopResponse)[part].label}"
+            own_unit = unit if of.unit_of else of.unit
+            key = f"{part}.{of.key}"
+            found[key] = Measure(
+                title, own_unit, (key,), "<=", 0.1, of_slew=True, is_share=name == "overshoot"
+            )
+    # which have short names
+    return {key: each for key, each in found.items() if key not in ("tip.settling_time_s", "tip.overshoot")}
 
 
 MEASURES = {
     "gain_margin_db": Measure("gain margin", "dB", ("GM", "gain_margin"), ">="),
+    "gain_reduction_db": Measure("gain margin, downwards", "dB", ("gain_reduction",), ">="),
     "phase_margin_deg": Measure("phase margin", "deg", ("PM", "phase_margin"), ">="),
     "delay_margin_periods": Measure("delay margin", "periods", ("delay", "delay_margin"), ">="),
+    "delay_margin_ms": Measure("delay margin", "ms", ("delay_margin_ms",), ">="),
     "peak_sensitivity": Measure("peak sensitivity", "", ("Ms", "sensitivity"), "<="),
     "disk_margin": Measure("disk margin", "", ("disk",), ">="),
     "least_damping": Measure("least damping ratio", "", ("damping",), ">=", 0.01, is_share=True),
     "time_constant_s": Measure("dominant time constant", "s", ("time-constant", "time_constant"), "<="),
-    "settling_time_s": Measure("settling time of the tip", "s", ("settling",), "<=", 0.1, of_slew=True),
-    "overshoot": Measure("overshoot of the tip", "", ("overshoot",), "<=", 0.01, of_slew=True, is_share=True),
-    "residual_moment": Measure("residual root moment", "N m", ("residual",), "<=", of_slew=True),
-    "peak_input": Measure("largest input", "of the arm", ("torque", "input"), "<=", of_slew=True),
+    "bandwidth_rad_s": Measure("bandwidth", "rad/s", ("bandwidth",), ">="),
+    "inverse_bandwidth_s": Measure("inverse of the bandwidth", "s", ("bandwidth^-1",), "<="),
+    NORM: Measure("weighted H-infinity norm", "", ("norm",), "<=", of_samples=True),
+    "settling_time_s": Measure(
+        "settling time of the tip", "s", ("settling", "tip.settling_time_s"), "<=", 0.1, of_slew=True
+    ),
+    "overshoot": Measure(
+        "overshoot of the tip", "", ("overshoot", "tip.overshoot"), "<=", 0.01, of_slew=True, is_share=True
+    ),
+    "residual_moment": Measure(
+        "residual root moment", "N m", ("residual", "residual_moment_rms"), "<=", of_slew=True
+    ),
+    "residual_raw_moment_rms": Measure(
+        "rms of the root moment after the slew", "N m", ("residual_raw",), "<=", of_slew=True
+    ),
+    "peak_input": Measure("largest input", INPUT_UNIT, ("torque", "input"), "<=", of_slew=True),
+    **_figures(),
 }
 _NAMES = {word: key for key, each in MEASURES.items() for word in (key, *each.short)}
 
@@ -103,7 +150,9 @@ GOOD = limits_of_good()
 
 def measure_named(word: str, key: str) -> str:
     """Return the name of the quantity with this name or short form.  Raises ParameterError for an unknown one."""
-    must_be_known(key, word, _NAMES)
+    if word not in _NAMES:
+        names = dict.fromkeys(re.sub(r"^\w+\.", "SIGNAL.", each.short[0]) for each in MEASURES.values())
+        raise ParameterError(key=key, value=word, remedy=did_you_mean(word, names))
     return _NAMES[word]
 
 
@@ -152,7 +201,7 @@ def load_requirements(name_or_path: AnyFile) -> tuple[Requirement, ...] | None:
 def _of_text(text: str) -> Requirement:
     """Return the requirement of one text."""
     form = "a quantity, >= or <=, and a number, such as PM>=45 or damping>=2%"
-    parts = re.fullmatch(r"\s*([\w-]+)\s*(>=|<=)\s*([-+.\deE]+)\s*(%?)\s*", text)
+    parts = re.fullmatch(r"\s*([\w.^-]+?)\s*(>=|<=)\s*([-+.\deE]+)\s*(%?)\s*", text)
     if parts is None:
         raise ParameterError(key="require", value=text, remedy=form)
     word, sense, number, percent = parts.groups()

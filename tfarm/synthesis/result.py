@@ -3,6 +3,7 @@
 from typing import Annotated, Any, Literal, NamedTuple
 
 from tfarm.dsp import Chain
+from tfarm.loop.norms import NormBound
 from tfarm.loop.sampled_brief import SampledBrief
 from tfarm.loop.stability import Stability
 from tfarm.records import frozen
@@ -152,6 +153,10 @@ class Design:
     verification: Annotated[
         Verification | None,
         Quantity("fresh arms", help="requirements on arms drawn from a study or posterior"),
+    ] = None
+    norm: Annotated[
+        NormBound | None,
+        Quantity("weighted norm", help="of all weighted functions of the sampled loop as a column"),
     ] = None
 
     @property

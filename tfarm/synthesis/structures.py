@@ -28,6 +28,7 @@ from tfarm.records import frozen
 from tfarm.spectrum import modes as natural_modes
 from tfarm.spectrum.gains import check_gains, rate_unit, turning_inertia
 from tfarm.spectrum.table import first_frequency
+from tfarm.synthesis.anti_windup import with_anti_windup
 from tfarm.synthesis.observer import filter_gain, held_model, integral_feedback, observer_law
 
 Bounds = tuple[float, float]
@@ -84,7 +85,7 @@ class Structure:
     """A law with `free` coefficients, and `fixed` ones, which are not searched.
 
     `entries` maps coefficients (n, laws) to the entries; the bounds of the coefficients named in `given` are not to be
-    widened.
+    widened.  Where the input `is_limited` a law with an integrator has anti-windup.
     """
 
     name: str
@@ -92,6 +93,7 @@ class Structure:
     fixed: dict[str, float]
     entries: Callable[[Real], tuple[Entry, ...]]
     given: tuple[str, ...] = ()
+    is_limited: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -150,7 +152,8 @@ class Structure:
         blocks = {}
         for signal, num, den in self.entries(c[:, None]):
             blocks[signal] = tuple(num[:, 0].tolist()), tuple(den[:, 0].tolist())
-        return Law(blocks, name=self.name, references=tuple(blocks))
+        law = Law(blocks, name=self.name, references=tuple(blocks))
+        return with_anti_windup(law) if self.is_limited else law
 
     def at_ends(self, x: Real) -> Ends:
         """Return the ends of the bounds at which coefficients are: nearer than a thousandth of the range of x."""
