@@ -146,7 +146,7 @@ class Design:
     ] = ()
     sensitivities: Annotated[
         tuple[RequirementSlope, ...],
-        Quantity("sensitivities", help="changes of the required quantities, sampled loop, by the model"),
+        Quantity("sensitivities", help="changes of the required quantities of the sampled loop, exact"),
     ] = ()
 
     verification: Annotated[
