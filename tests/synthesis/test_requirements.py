@@ -181,8 +181,11 @@ def test_sensitivities_are_the_differences_of_the_cards(good):
 def test_a_limit_of_the_input_holds_in_the_slew():
     free = tfarm.design(LAB, require="good")
     limit = round(0.97 * abs(tfarm.step(LAB, free.law, None, "slew").sampled.torque.peak), 2)
-    found = tfarm.design(LAB, require=f"good, torque<={limit}")
+    found = tfarm.design(LAB, "residual", require=f"good, torque<={limit}")
     assert found.is_met
+    assert found.slew_duration is not None
+    run = tfarm.simulate(LAB, found.law, duration=found.slew_duration)
+    assert run.residual_moment == pytest.approx(found.value, rel=1e-6)
     assert abs(tfarm.step(LAB, found.law, None, "slew").sampled.torque.peak) <= limit
     assert abs(tfarm.step(LAB, free.law, None, "slew").sampled.torque.peak) > limit
 
