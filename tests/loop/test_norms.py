@@ -16,6 +16,7 @@ from tests.survey import tally
 from tfarm import HubFeedback, Law
 from tfarm.arm.law_tables import load_weights
 from tfarm.arm.weights import weights_of
+from tfarm.arm.writing import to_toml
 from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, pulse_transfer
 from tfarm.dsp.discretise import discretise_law
@@ -193,6 +194,9 @@ def test_the_command_reads_weights_of_the_controllers_file_or_of_options(tmp_pat
     other = answer(capsys, "norm", "sasaki2012-lab", "--law", str(path), "--weight", "T=1")
     assert [row["function"] for row in other["bounds"]] == ["W_T T", "stacked column"]
     assert load_weights("sasaki2012-lab") is None
+    arm = tmp_path / "arm.toml"
+    arm.write_text(f"{to_toml(LAB)}\n{path.read_text()}")
+    assert answer(capsys, "norm", str(arm))["bounds"] == of_file["bounds"]
 
 
 @pytest.mark.parametrize(

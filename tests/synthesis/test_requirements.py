@@ -19,7 +19,7 @@ from tfarm.assessment.signal_figures import PARTS
 from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, pulse_transfer
 from tfarm.schema.quantities import to_dict
-from tfarm.synthesis.goals import Goal, check, exact_values
+from tfarm.synthesis.goals import Goal, card_values, check, exact_values
 from tfarm.synthesis.judge import judge_of, slowest_allowed
 from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.required import RequirementTask
@@ -42,6 +42,7 @@ def test_a_list_a_table_and_the_word_good_say_the_same():
     assert [each.name for each in names] == ["tip.rise_time_s", "inverse_bandwidth_s", "stacked_norm"]
     stricter = requirements_of("good, PM>=60")
     assert [each.limit for each in stricter] == [6.0, 60.0, 1.0, 2.0]
+    assert requirements_of("PM>=60, good") == stricter
 
 
 @pytest.mark.parametrize(
@@ -57,6 +58,14 @@ def test_a_list_a_table_and_the_word_good_say_the_same():
         ("tip.final_value<=1", "SIGNAL.rise_time_s, SIGNAL.overshoot, SIGNAL.steady_state_error"),
         ("bandwidth<=3", "bandwidth is limited by >="),
         ("hub.peak<=3%", "peak, hub is in rad"),
+        ("pm>=45", 'did you mean "PM"? known are: GM, PM, delay,'),
+        ("damping>=2", "at most 1, such as 2% or 0.02"),
+        ("PM>=-20", "at least 0, at most 360"),
+        ("delay>=-1", "at least 0, at most 40"),
+        ("Ms<=0.5", "at least 1"),
+        ("disk>=3", "at most 2"),
+        ("settling<=-1", "at least 0"),
+        ("PM>=45, phase_margin>=50", "two limits of one quantity"),
     ],
 )
 def test_a_bad_requirement_is_refused_with_its_form(capsys, text, words):
@@ -80,6 +89,10 @@ def test_what_is_large_in_a_good_loop_is_not_minimised(capsys):
         (["--trade-off", "--save", "-"], "--save = '-': a front has several laws"),
         (["--continuous", "--require", "good"], "requirements are of both loops"),
         (["--fresh", "0", "--posterior", "Makefile"], "fresh arms = 0"),
+        (["--fresh", "5"], "--fresh = 5: goes with --study or --posterior"),
+        (["--minimise", "margin", "--require", "good"], "objective = 'margin': goes without requirements"),
+        (["--range", "hub.inertia=1,2", "--range", "hub.inertia=1,3"], "--range = 'hub.inertia': is given twice"),
+        (["--save", "."], "--save = '.': is a folder"),
     ],
 )
 def test_options_that_exclude_each_other_are_refused_before_any_work(capsys, options, words):
@@ -91,9 +104,16 @@ def test_requirements_of_a_file_are_read_and_its_errors_name_it(tmp_path):
     file.write_text(f"{file_text(LAB)}\n[requirements]\nPM = 50\n")
     assert tfarm.load(file).hub == LAB.hub
     assert load_requirements(file) == requirements_of("PM>=50")
-    file.write_text('[requirements]\nPM = "high"\n')
-    with pytest.raises(tfarm.ParameterError, match=r"arm\.toml.*requirements\.PM"):
-        load_requirements(file)
+    for table, words in {
+        'PM = "high"': r"requirements\.PM = 'high'",
+        "PM = nan": r"requirements\.PM = nan: phase margin is limited by a number",
+        "PM = 45\nphase_margin = 50": "requirements = .*two limits",
+        "PN = 45": "requirements = 'PN': known are: GM",
+        "": "requirements = {}: give a limit",
+    }.items():
+        file.write_text(f"[requirements]\n{table}\n")
+        with pytest.raises(tfarm.ParameterError, match=rf"arm\.toml: {words}"):
+            load_requirements(file)
     assert load_requirements("sasaki2012-lab") is None
 
 
@@ -117,6 +137,12 @@ def test_the_norm_on_the_model_is_that_of_what_the_controller_reads(chain):
             "stacked_norm"
         ]
         assert 0.998 * bound <= value <= bound
+
+
+def test_a_missing_profile_is_refused_before_any_search(capsys, tmp_path):
+    file = tmp_path / "arm.toml"
+    file.write_text(f'{file_text(LAB)}\n[reference]\nprofile = "file"\nfile = "missing.csv"\n')
+    assert "missing.csv" in refused(capsys, "design", str(file), "--minimise", "settling")
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -195,11 +221,23 @@ def test_active_requirements_are_those_at_their_limit(good):
     assert set(good.active) < set(rows)
 
 
+def test_sensitivities_are_the_differences_of_the_cards(good):
+    """Against cards of laws two per cent apart; the slope of the margin changes by less than a tenth between them."""
+    for each in good.sensitivities:
+        laws = [replace(good.law, **{each.coefficient: f * getattr(good.law, each.coefficient)}) for f in (0.99, 1.01)]
+        low, high = (card_values(tfarm.result_card(LAB, law).sampled) for law in laws)
+        name = requirements_of(each.requirement)[0].name
+        assert each.change == pytest.approx((high[name] - low[name]) / 2, rel=0.1)
+
+
 def test_a_limit_of_the_input_holds_in_the_slew(good):
     free = abs(tfarm.step(LAB, good.law, None, "slew").sampled.torque.peak)
     limit = round(0.97 * free, 2)
-    found = tfarm.design(LAB, require=f"good, torque<={limit}")
+    found = tfarm.design(LAB, "residual", require=f"good, torque<={limit}")
     assert found.is_met
+    assert found.slew_duration is not None
+    run = tfarm.simulate(LAB, found.law, duration=found.slew_duration)
+    assert run.residual_moment == pytest.approx(found.value, rel=1e-6)
     assert abs(tfarm.step(LAB, found.law, None, "slew").sampled.torque.peak) <= limit < free
 
 

@@ -287,7 +287,7 @@ def load_chain(name_or_path: AnyFile) -> Chain:
 
 def chain_of_tables(tables: Mapping[str, Any]) -> Chain:
     """Return the chain of a parsed file, which may also have the tables of an arm."""
-    known = {*CHAIN_TABLES, *ArmTable.model_fields, "law", "requirements"}
+    known = {*CHAIN_TABLES, *ArmTable.model_fields, "law", "weights", "requirements"}
     for key, value in tables.items():
         require(key in known, key, value, unknown_key(key, CHAIN_TABLES))
     records = {}

@@ -37,7 +37,6 @@ from tfarm.cli.options import (
 )
 from tfarm.cli.output import emit, emit_record
 from tfarm.cli.progress import advance, print_line
-from tfarm.errors import require
 from tfarm.files import is_standard_output
 
 command = partial(add_command, "Design")
@@ -70,7 +69,7 @@ def design(
     ] = None,
     study: Annotated[Path | None, typer.Option("--study", metavar="FILE", exists=True)] = None,
     posterior: Annotated[Path | None, typer.Option("--posterior", metavar="FILE", exists=True)] = None,
-    fresh: int = 64,
+    fresh: int | None = None,
     weight: WeightEntries = None,
     trade_off: Annotated[bool, typer.Option("--trade-off")] = False,
     save: File = None,
@@ -84,12 +83,13 @@ def design(
     The sampling period is that of the file, or else 10 ms.
 
     Options:
-    objective: settling, time-constant, torque, Ms, norm, bandwidth^-1 ...; without requirements: damping, margin,
-        sensitivity, delay, residual or cost (of the tuner)
+    objective: quantity that is minimised under requirements: settling, time-constant, overshoot, residual, torque, Ms,
+        norm, bandwidth^-1 ...; or one without requirements: damping, margin, sensitivity, delay, residual or cost (of
+        the tuner)
     require: requirements such as "GM>=6, PM>=45, Ms<=2, delay>=1, damping>=2%, torque<=5, settling<=1.5"
     study: file of a study: requirements hold on the worst arms of a pool drawn from it
     posterior: posterior of a fit, likewise
-    fresh: further arms drawn, on which the law is examined
+    fresh: further arms drawn, on which the law is examined; by default 64
     trade_off: the front of speed against robustness instead: 12 designs; --save FILE writes each to FILE-01.toml ...
     continuous: for the continuous-time loop
     also: further arm; the objective is the worst of all; may be repeated
@@ -100,6 +100,8 @@ def design(
     from tfarm.arm.writing import save_law
     from tfarm.synthesis.requirements import load_requirements
 
+    if study is None and posterior is None:
+        refuse({"fresh": fresh}, "goes with --study or --posterior")
     subject = load_arm(arm, theory)
     options: dict[str, Any] = {
         "require": load_requirements(arm) if require is None else require,
@@ -126,12 +128,13 @@ def design(
         ranges=dict(over or []),
         study=study,
         posterior=posterior,
-        fresh=fresh,
+        fresh=64 if fresh is None else fresh,
         **options,
     )
+    case = tfarm.Case(subject, found.law, options["chain"])
     if save is not None:
-        save_law(tfarm.Case(subject, found.law).law, save)
-    show(found, also=(save,))
+        save_law(case.law, save)
+    show(found, also=(save,), summary=case.card())
 
 
 def _emit_front(
@@ -453,9 +456,6 @@ def study(
     from tfarm.studies.running import cluster
     from tfarm.studies.study import study as run
 
-    keys = [key for key, _ in over or []]
-    for key in keys:
-        require(keys.count(key) == 1, "--over", key, "is varied twice; once is enough")
     typed = {
         "over": dict(over or []) or None,
         "ask": ask and ask.split(","),
@@ -476,4 +476,5 @@ def study(
         from tfarm.report.study_page import write_study
 
         page = write_study(found)
-    show(found, None if any(key.startswith("law.") for key in keys) else defaults, also=(page,))
+    varies_law = any(key.startswith("law.") for key, _ in over or [])
+    show(found, None if varies_law else defaults, also=(page,))

@@ -72,15 +72,15 @@ def profile_of_file(path: str) -> "CubicSpline":
             raise ParameterError(key="reference.file", value=lines[:1], remedy=remedy) from None
         require(table.ndim == 2 and table.shape[1] == 2, "reference.file", lines[:1], remedy)
         t, angle = table.T
+        # of times and angles: those of no slew are larger
+        largest = 1e9
+        is_finite = len(t) >= 4 and (abs(table) <= largest).all()
+        require(is_finite, "reference.file", lines[:4], "give at least four lines of finite numbers")
         require(
-            len(t) >= 4 and np.isfinite(table).all(), "reference.file", len(t), "at least four finite points"
+            (np.diff(t) > 0).all(), "reference.file", lines[:4], "times have to increase from line to line"
         )
-        require(
-            (np.diff(t) > 0).all(), "reference.file", t.tolist()[:3], "times that increase from line to line"
-        )
-        require(
-            angle[-1] != angle[0], "reference.file", float(angle[0]), "an end at another angle than the start"
-        )
+        remedy = "the last angle has to be another than the first"
+        require(abs(angle[-1] - angle[0]) * largest > np.ptp(angle), "reference.file", lines[-1], remedy)
     return CubicSpline(
         (t - t[0]) / (t[-1] - t[0]), (angle - angle[0]) / (angle[-1] - angle[0]), bc_type="clamped"
     )

@@ -21,6 +21,7 @@ from tfarm.arm.weights import USUAL_WEIGHTS, Weights, weights_of
 from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import arm_under_chain
+from tfarm.dsp.profiles import motion_of_slew
 from tfarm.dsp.simulate import quantisers
 from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, ParameterError
@@ -34,7 +35,14 @@ from tfarm.synthesis.drawn import AnyStudy, drawn_arms, verify, violation_on
 from tfarm.synthesis.goals import norm_bound
 from tfarm.synthesis.judge import LOST, OBJECTIVES, TOO_SLOW, Judge, judge_of, model_sizes
 from tfarm.synthesis.required import RequiredLaw, RequirementTask, why_none
-from tfarm.synthesis.requirements import MEASURES, NORM, RequirementList, measure_named, requirements_of
+from tfarm.synthesis.requirements import (
+    MEASURES,
+    NAMES,
+    NORM,
+    RequirementList,
+    measure_named,
+    requirements_of,
+)
 from tfarm.synthesis.result import Design, OnArm
 from tfarm.synthesis.search import Search, Worst, flat_part, search
 from tfarm.synthesis.stability_map import recommended_gains
@@ -310,12 +318,18 @@ class _Options:
         if objective is None:
             # an arm that cannot turn has no slew
             objective = "settling" if self.arm.has_rigid_mode else "time-constant"
+        remedy = (
+            "goes without requirements: leave them out, or minimise settling, time-constant, torque or Ms"
+        )
+        require_that(objective not in OBJECTIVES or objective in NAMES, "objective", objective, remedy)
         minimised = measure_named(objective, "objective")
         remedy = "is large in a good loop: require it, and minimise settling, time-constant, torque or Ms"
         require_that(MEASURES[minimised].sense == "<=", "objective", objective, remedy)
         limits = requirements_of("good" if wanted is None else wanted)
         if MEASURES[minimised].of_slew or any(each.measure.of_slew for each in limits):
             must_turn(self.arm)
+            # a file of a profile is read here, before any search
+            motion_of_slew(self.chain, self.arm.reach, np.arange(2.0))
         arms, form = self.arms_and_form(is_angle_free=True)
         names = {minimised, *(each.name for each in limits)}
         if "peak_input" in names:

@@ -269,6 +269,18 @@ def _bandwidths(name: str, case: Case) -> dict[str, float]:
     return {"bandwidth_rad_s": found, "inverse_bandwidth_s": 1 / found}
 
 
+def loop_values(name: str, case: Case, weights: Weights | None) -> dict[str, float]:
+    """Return the exact measures of the loop of that name; the norm, of the sampled one with weights, by its bound."""
+    card = loop_card(name, case)
+    values = card_values(card)
+    if card.stability == "stable":
+        values |= _bandwidths(name, case)
+        if weights is not None and name == "sampled":
+            bound = norm_bound(case.on(graded_arm(case.arm)[0]), weights)
+            values[NORM] = bound.value if bound.upper is None else bound.upper
+    return values
+
+
 @lru_cache(256)
 def exact_values(case: Case, known: Arm | None, weights: Weights | None = None) -> LoopValues:
     """Return the measures of both loops of a case by the result card.
@@ -281,14 +293,7 @@ def exact_values(case: Case, known: Arm | None, weights: Weights | None = None) 
             found.append(None)
             continue
         try:
-            card = loop_card(name, case)
-            values = card_values(card)
-            if card.stability == "stable":
-                values |= _bandwidths(name, case)
-                if weights is not None and name == "sampled":
-                    bound = norm_bound(case.on(graded_arm(case.arm)[0]), weights)
-                    values[NORM] = bound.value if bound.upper is None else bound.upper
-            found.append(values)
+            found.append(loop_values(name, case, weights))
         except ConvergenceError:
             found.append({})
     sampled = found[0] or {}

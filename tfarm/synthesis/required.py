@@ -26,9 +26,8 @@ from tfarm.loop.edges import most_modes
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.records import frozen
 from tfarm.schema import Quantity
-from tfarm.synthesis.goals import WEIGHT, Checked, Goal, check, exact_values, polished
+from tfarm.synthesis.goals import WEIGHT, Checked, Goal, check, exact_values, loop_values, polished
 from tfarm.synthesis.judge import LOST, Judge, judge_of, model_sizes
-from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.models import sampled_model
 from tfarm.synthesis.requirements import MEASURES, Requirement
 from tfarm.synthesis.search import Search, Worst, search
@@ -256,26 +255,26 @@ class RequirementTask:
         return tuple(found)
 
     def sensitivities(self, choice: RequiredLaw) -> list[RequirementSlope]:
-        """Return the changes of the required quantities of the sampled loop by the model of the first arm.
+        """Return the changes of the required quantities of the exact sampled loop, by differences.
 
         A margin without a limit has none.
         """
-        judge = choice.worst.judges[0]
         form = choice.search.form
-        at = form.coefficients(choice.x[:, None])
         change = 0.001
         found = []
         for n, coefficient in enumerate(form.names):
-            c = np.repeat(at, 2, axis=1)
-            c[n] *= (1 + change, 1 - change)
-            entries = form.entries(c)
-            loop = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
+            cards = []
+            for factor in (1 + change, 1 - change):
+                c = form.coefficients(choice.x)
+                c[n] *= factor
+                case = Case(self.arm, form.record_at(form.at(c)), self.chain)
+                cards.append(loop_values("sampled", case, self.weights))
             for each in self.requirements:
                 if not each.measure.is_of(0):
                     continue
-                values = loop.of(each.name)
-                if np.isfinite(values).all():
-                    slope = float(values[0] - values[1]) / (2 * change) / 100
+                above, below = (values.get(each.name, np.inf) for values in cards)
+                slope = (above - below) / (2 * change) / 100
+                if np.isfinite(slope):
                     found.append(RequirementSlope(str(each), coefficient, slope))
         return found
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Literal, NamedTuple, cast
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
@@ -101,7 +101,14 @@ MEASURES = {
     "peak_input": Measure("largest input", INPUT_UNIT, ("torque", "input"), "<=", of_slew=True),
     **_figures(),
 }
-_NAMES = {word: key for key, each in MEASURES.items() for word in (key, *each.short)}
+# largest limits: no loop has more, and models of up to twice the delay are searched, of at most 100
+MOST = {
+    "phase_margin_deg": 360.0,
+    "delay_margin_periods": 40.0,
+    "disk_margin": 2.0,
+    "least_damping": 1.0,
+}
+NAMES = {word: key for key, each in MEASURES.items() for word in (key, *each.short)}
 
 
 class Requirement(NamedTuple):
@@ -150,35 +157,40 @@ GOOD = limits_of_good()
 
 def measure_named(word: str, key: str) -> str:
     """Return the name of the quantity with this name or short form.  Raises ParameterError for an unknown one."""
-    if word not in _NAMES:
-        names = dict.fromkeys(re.sub(r"^\w+\.", "SIGNAL.", each.short[0]) for each in MEASURES.values())
-        raise ParameterError(key=key, value=word, remedy=did_you_mean(word, names))
-    return _NAMES[word]
+    names = dict.fromkeys(re.sub(r"^\w+\.", "SIGNAL.", each.short[0]) for each in MEASURES.values())
+    require(word in NAMES, key, word, did_you_mean(word, names))
+    return NAMES[word]
 
 
 # a list in a text, a limit for each name, or requirements
 RequirementList = str | Mapping[str, float | str] | Sequence[Requirement]
 
 
-def requirements_of(wanted: RequirementList) -> tuple[Requirement, ...]:
-    """Return the requirements of a text, a table, or a sequence of them.
+def requirements_of(wanted: RequirementList, key: str = "require") -> tuple[Requirement, ...]:
+    """Return the requirements of a text, a table, or a sequence of them; `key` names it in a refusal.
 
-    A text is a list such as "GM>=6, PM>=45, damping>=2%"; "good" is the limits of the grade.  A table has a
-    limit for each name, {"phase_margin": 45}; its sense is that of a good value.
-    Raises ParameterError for an unknown name, a limit that is no finite number, and the sense that is never good.
+    A text is a list such as "GM>=6, PM>=45, damping>=2%"; "good" is the limits of the grade, but of quantities that
+    have one of their own.  A table has a limit for each name, {"phase_margin": 45}; its sense is that of a good value.
+    Raises ParameterError for an unknown name, a limit that no loop can have, the sense that is never good, two limits
+    of a quantity, and none at all.
     """
+    good: tuple[Requirement, ...] = ()
     if isinstance(wanted, str):
         texts = [each.strip() for each in wanted.split(",")]
-        found = [each for text in texts for each in (GOOD if text == "good" else (_of_text(text),))]
+        good = GOOD if "good" in texts else ()
+        found = [_of_text(key, text) for text in texts if text != "good"]
     elif isinstance(wanted, Mapping):
         found = [
-            _of_text(f"{name}{MEASURES[measure_named(name, 'require')].sense}{limit}")
+            _requirement(f"{key}.{name}", limit, measure_named(name, key), str(limit))
             for name, limit in wanted.items()
         ]
     else:
         found = list(wanted)
-    last = {each.name: each for each in found}
-    return tuple(last.values())
+    names = [each.name for each in found]
+    twice = [str(each) for each in found if names.count(each.name) > 1]
+    require(not twice, key, ", ".join(twice), "two limits of one quantity: keep one")
+    require(good or found, key, wanted, "give a limit, such as PM>=45, or good")
+    return tuple({each.name: each for each in (*good, *found)}.values())
 
 
 def load_requirements(name_or_path: AnyFile) -> tuple[Requirement, ...] | None:
@@ -195,28 +207,39 @@ def load_requirements(name_or_path: AnyFile) -> tuple[Requirement, ...] | None:
         for key, value in table.items():
             is_number = isinstance(value, int | float) and not isinstance(value, bool)
             require(is_number, f"requirements.{key}", value, "a number, such as PM = 45 or damping = 0.02")
-        return requirements_of(table)
+        return requirements_of(table, "requirements")
 
 
-def _of_text(text: str) -> Requirement:
+def _of_text(key: str, text: str) -> Requirement:
     """Return the requirement of one text."""
+    parts = re.fullmatch(r"([\w.^-]+?)\s*(>=|<=)\s*([-+.\deE]+\s*%?)", text)
     form = "a quantity, >= or <=, and a number, such as PM>=45 or damping>=2%"
-    parts = re.fullmatch(r"\s*([\w.^-]+?)\s*(>=|<=)\s*([-+.\deE]+)\s*(%?)\s*", text)
     if parts is None:
-        raise ParameterError(key="require", value=text, remedy=form)
-    word, sense, number, percent = parts.groups()
-    name = measure_named(word, "require")
+        raise ParameterError(key=key, value=text, remedy=form)
+    word, sense, number = parts.groups()
+    name = measure_named(word, key)
     measure = MEASURES[name]
-    require(sense == measure.sense, "require", text, f"{measure.title} is limited by {measure.sense}")
-    require(
-        not percent or measure.is_share,
-        "require",
-        text,
-        f"{measure.title} is in {measure.unit or 'units of 1'}",
-    )
+    require(sense == measure.sense, key, text, f"{measure.title} is limited by {measure.sense}")
+    return _requirement(key, text, name, number)
+
+
+def _requirement(key: str, value: object, name: str, number: str) -> Requirement:
+    """Return the requirement on a quantity with this limit, a number or a percentage; `value` is it as given."""
+    measure = MEASURES[name]
+    is_percentage = number.endswith("%")
+    unit = measure.unit or "units of 1"
+    require(measure.is_share or not is_percentage, key, value, f"{measure.title} is in {unit}: leave out %")
     try:
-        limit = float(number) / (100.0 if percent else 1.0)
+        limit = float(number.rstrip("% ")) / (100.0 if is_percentage else 1.0)
     except ValueError:
-        raise ParameterError(key="require", value=text, remedy=form) from None
-    require(math.isfinite(limit), "require", text, form)
-    return Requirement(name, cast("Sense", sense), limit)
+        limit = math.nan
+    least = 1.0 if name == "peak_sensitivity" else 0.0
+    most = MOST.get(name, math.inf)
+    words = [f"at least {least:g}"]
+    if name in MOST:
+        words.append(f"at most {most:g}")
+    if measure.is_share:
+        words.append("such as 2% or 0.02")
+    is_possible = least <= limit <= most and limit < math.inf
+    require(is_possible, key, value, f"{measure.title} is limited by a number, {', '.join(words)}")
+    return Requirement(name, measure.sense, limit)
