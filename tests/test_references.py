@@ -128,6 +128,7 @@ def test_a_file_of_the_polynomial_is_the_polynomial(tmp_path):
         ("t,a\n0,0\n1,1\n", "at least four"),
         ("t,a\n0,0\n1,1\n1,2\n2,3\n", "times that increase"),
         ("t,a\n0,0\n1,1\n2,2\n3,0\n", "another angle"),
+        ("t,a\n0,0\n1,1e308\n2,-1e308\n3,1\n", "finite numbers"),
         ("", "a comma between them"),
     ],
 )

@@ -77,9 +77,9 @@ def profile_of_file(path: str) -> "CubicSpline":
         is_finite = len(t) >= 4 and (abs(table) <= largest).all()
         require(is_finite, "reference.file", lines[:4], "give at least four lines of finite numbers")
         require(
-            (np.diff(t) > 0).all(), "reference.file", lines[:4], "times have to increase from line to line"
+            (np.diff(t) > 0).all(), "reference.file", lines[:4], "give times that increase from line to line"
         )
-        remedy = "the last angle has to be another than the first"
+        remedy = "give an end at another angle than the start"
         require(abs(angle[-1] - angle[0]) * largest > np.ptp(angle), "reference.file", lines[-1], remedy)
     return CubicSpline(
         (t - t[0]) / (t[-1] - t[0]), (angle - angle[0]) / (angle[-1] - angle[0]), bc_type="clamped"
