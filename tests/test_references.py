@@ -33,6 +33,7 @@ from tfarm.loop.sampled import sampled_loop
 from tfarm.references import reference
 from tfarm.references.bounds import SlewBounds
 from tfarm.references.shaped import certified_bound, with_frequencies
+from tfarm.spectrum.damped import damped_modes
 
 LAB = tfarm.load("sasaki2012-lab")
 LAW = tfarm.HubFeedback(K1=0.5, K2=0.1, Kp=2.0)
@@ -139,9 +140,44 @@ def test_a_wrong_file_of_a_profile_has_its_line(tmp_path, text, words):
     assert words in str(refusal(slew_scenario, LAB, chain, 1.0))
 
 
+@pytest.mark.parametrize("profile", ["s-curve", "polynomial"])
+def test_under_the_inverse_at_the_hub_the_arm_follows_by_itself(profile):
+    """Without feedback, by the simulation: its error is that of the hold, of second order in the period."""
+    errors = {}
+    for period, feedforward in [(0.01, "rigid"), (0.01, "inverse"), (0.002, "inverse")]:
+        run = tfarm.simulate(LAB, tfarm.HubFeedback(), shaped(profile=profile, period=period, feedforward=feedforward))
+        errors[period, feedforward] = abs(run.at_samples.hub_angle - run.scenario.hub_angle).max()
+    assert errors[0.01, "inverse"] < errors[0.01, "rigid"] / 50
+    assert errors[0.002, "inverse"] < errors[0.01, "inverse"] / 20
+
+
+def test_the_torque_of_the_inverse_ends_as_the_arm_with_its_hub_held():
+    """Its largest values over equal times decay with the first pole of that arm, by its modes."""
+    task = slew_scenario(LAB, shaped(profile="s-curve", feedforward="inverse"), 9.0)
+    held = replace(LAB, hub=replace(LAB.hub, inertia=math.inf))
+    decay = -damped_modes(tfarm.modes(held, 1)).eigenvalues[0, 0].real
+    early, late = (abs(task.feedforward[(begin <= task.t) & (task.t < begin + 3.0)]).max() for begin in (2.0, 6.0))
+    assert early / late == pytest.approx(math.exp(4 * decay), rel=0.01)
+    found = reference(LAB, LAW, shaped(profile="s-curve", feedforward="inverse"), error=0.02)
+    assert found.torque_after == pytest.approx(abs(task.feedforward[task.is_after]).max(), rel=1e-4)
+    assert found.torque_time == pytest.approx(
+        math.log(100 * found.torque_after / abs(task.feedforward).max()) / decay, rel=1e-3
+    )
+    assert reference(LAB, LAW, shaped(profile="s-curve", feedforward="none"), error=0.02).torque_after == 0.0
+
+
+def test_without_damping_the_torque_of_the_inverse_never_ends():
+    arm = tfarm.load("sasaki2012")
+    found = reference(arm, tfarm.HubFeedback(), shaped(profile="s-curve", feedforward="inverse"), error=0.02)
+    assert found.torque_after > 0.1
+    assert found.torque_time is None
+
+
 @pytest.mark.parametrize(
     ("table", "key"),
     [
+        ({"feedforward": "inverse"}, "reference.feedforward"),
+        ({"feedforward": "exact", "profile": "s-curve"}, "reference.feedforward"),
         ({"profile": "cubic"}, "reference.profile"),
         ({"shaper": "zv"}, "reference.shaper"),
         ({"modes": 0}, "reference.modes"),

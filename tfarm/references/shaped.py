@@ -17,7 +17,7 @@ import numpy as np
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.chain import Chain
 from tfarm.arm.checks import number
-from tfarm.arrays import Real
+from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.case import Case
 from tfarm.dsp import kernel
 from tfarm.dsp.results import simulate_modes
@@ -30,6 +30,8 @@ from tfarm.records import frozen
 from tfarm.references.bounds import Ranges, SlewBounds, check_ranges, range_words
 from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Column, Percent, Quantity, Table
+from tfarm.spectrum import modes
+from tfarm.spectrum.damped import damped_modes
 from tfarm.spectrum.table import first_frequency
 
 
@@ -86,6 +88,28 @@ class ShapedReference:
     controller: Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]
     profile: Annotated[str, Quantity("profile", help="of the slew before the shaper")]
     shaper: Annotated[str, Quantity("shaper", help="none, ZV, ZVD or EI")]
+    feedforward: Annotated[
+        str,
+        Quantity("feedforward", help="torque of the rigid arm, inverse of the exact one at the hub, or none"),
+    ]
+    torque_after: Annotated[
+        float,
+        Quantity(
+            "feedforward after the slew",
+            "N m",
+            4,
+            help="its largest size; an inverse rings on as the held arm",
+        ),
+    ]
+    torque_time: Annotated[
+        float | None,
+        Quantity(
+            "time until it is small",
+            "s",
+            3,
+            help="1 % of its largest, by the least damped mode of the arm with its hub held; null where it never is",
+        ),
+    ]
     rise_time: Annotated[float, Quantity("rise time", "s", 4, help="of the profile")]
     added: Annotated[float, Quantity("time added by the shaper", "s", 4, help="until its last impulse")]
     impulses: Annotated[tuple[Impulse, ...], Quantity("impulses", help="of the shaper, all modes together")]
@@ -209,6 +233,7 @@ def reference(
         for task in (late, plain)
     ]
     middle = errors.size // 2
+    torque_after = float(abs(late.feedforward[late.is_after]).max())
     bound, certainty = certified_bound(case, late, {})
     rows = []
     if ranges:
@@ -217,6 +242,9 @@ def reference(
         controller=controller(case.law, case.arm),
         profile=shaping.profile,
         shaper=shaping.shaper,
+        feedforward=shaping.feedforward,
+        torque_after=torque_after,
+        torque_time=time_until_small(case.arm, torque_after / max(abs(late.feedforward).max(), LEAST_SIZE)),
         rise_time=chain.slew.rise_time,
         added=added,
         impulses=tuple(Impulse(k * period, float(impulses[k])) for k in np.flatnonzero(impulses).tolist()),
@@ -233,6 +261,18 @@ def reference(
         nominal=late,
         plain=plain,
     )
+
+
+def time_until_small(arm: Arm, share: float) -> float | None:
+    """Return the time [s] until a share is 1 % by the least damped mode of the held arm; None for never."""
+    if share <= 0.01:
+        return 0.0
+    held = modes(replace(arm, hub=replace(arm.hub, inertia=math.inf)), 10)
+    if arm.is_undamped:
+        return None
+    # the modes beyond the tenth are damped more
+    decay = -float(np.nanmax(damped_modes(held).eigenvalues.real))
+    return math.log(100 * share) / decay if decay > 0 else None
 
 
 def with_frequencies(arm: Arm, factor: float) -> Arm:
