@@ -22,12 +22,12 @@ from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.references.uncertain import most_residual, uncertain_loop
 from tfarm.response.signals import Signals
 from tfarm.spectrum.box import TOWARD_SINGULAR
-from tfarm.spectrum.enclosed import AFFINE_KEYS, ArmBox
+from tfarm.spectrum.enclosed import AFFINE_KEYS, EnclosedArms
 
 Ranges = Mapping[str, tuple[float, float]]
 
 
-class Band(NamedTuple):
+class PoleBand(NamedTuple):
     """A band up to `top` [rad/s] right of -`line` [1/s], with the number of poles of each arm, and its tails."""
 
     line: float
@@ -40,7 +40,7 @@ class Bound(NamedTuple):
     """A bound on the residual root moment [N m] over a box of arms, and the residual of the middle one."""
 
     ranges: Ranges
-    band: Band
+    band: PoleBand
     most: float
     least: float
 
@@ -83,7 +83,7 @@ class SlewBounds:
         boxes: list[tuple[float, int, Ranges, Bound | None]] = []
         least = 0.0
 
-        def bound(box: Ranges, band: Band | None) -> None:
+        def bound(box: Ranges, band: PoleBand | None) -> None:
             nonlocal least
             n = next(number)
             try:
@@ -108,12 +108,12 @@ class SlewBounds:
             for ends in ((low, (low + high) / 2), ((low + high) / 2, high)):
                 bound({**box, key: ends}, worst and worst.band)
 
-    def bound(self, keyed: KeyedArms, box: Ranges, band: Band | None) -> Bound:
+    def bound(self, keyed: KeyedArms, box: Ranges, band: PoleBand | None) -> Bound:
         """Return the bound over one box, in a band if it is known.  Raises CertificationError."""
         corners = [keyed.at(dict(zip(box, ends, strict=True))) for ends in itertools.product(*box.values())]
         middle = keyed.at({key: (low + high) / 2 for key, (low, high) in box.items()})
         read = Signals(middle, self.names)
-        arms = ArmBox(middle, tuple(corners), read.outputs, read.places)
+        arms = EnclosedArms(middle, tuple(corners), read.outputs, read.places)
         poles = undelayed_plant(middle, ("hub_angle",), USUAL_MODES).poles
         line, top = (band.line, band.top) if band else self.edges(poles, middle.damping)
         poles = poles[(poles.real > -line) & (poles.imag >= 0) & (poles.imag < top)]
@@ -123,7 +123,7 @@ class SlewBounds:
         # last, as it takes longest
         if band is None:
             tails = arms.tail(line, top, self.sampling.period, self.sampling.remaining)
-            band = Band(line, top, arms.count(line, top), tails)
+            band = PoleBand(line, top, arms.count(line, top), tails)
         if poles.size + np.count_nonzero(poles.imag) != band.number:
             raise CertificationError("not every pole of the band is known")
         signals = self.in_z.signals

@@ -49,7 +49,7 @@ AFFINE_KEYS = re.compile(
 )
 
 
-class Enclosure(NamedTuple):
+class EnclosedNumbers(NamedTuple):
     """Numbers within `radius` of `middle`, arrays of one shape."""
 
     middle: Any
@@ -63,16 +63,16 @@ class EnclosedPlant:
     `residues` and `shares`, the same over p, are (outputs, n), `at_rest` the coefficients of s^-2, s^-1 and 1.
     """
 
-    multipliers: Enclosure
-    early: Enclosure
-    late: Enclosure
-    residues: Enclosure
-    shares: Enclosure
-    at_rest: Enclosure
+    multipliers: EnclosedNumbers
+    early: EnclosedNumbers
+    late: EnclosedNumbers
+    residues: EnclosedNumbers
+    shares: EnclosedNumbers
+    at_rest: EnclosedNumbers
 
 
 @frozen
-class ArmBox:
+class EnclosedArms:
     """The arms between those at the `corners`, around a `middle` one, with outputs at shares of the length."""
 
     middle: Arm
@@ -185,13 +185,13 @@ class ArmBox:
                 own = [(p * T).exp(), ((p * t).exp() - 1) / p, ((p * T).exp() - (p * t).exp()) / p]
                 residues = self._residues(m, p)
                 rows.append([*own, *residues, *(each / p for each in residues)])
-        found = enclosure(rows)
+        found = enclosed_numbers(rows)
         is_pair = poles.imag != 0
         middle = np.r_[found.middle, found.middle[is_pair].conj()].T
         radius = np.r_[found.radius, found.radius[is_pair]].T
         ends = [1, 2, 3, 3 + len(self.outputs)]
-        own = [*map(Enclosure, np.split(middle, ends), np.split(radius, ends))]
-        first, early, late = (Enclosure(each.middle[0], each.radius[0]) for each in own[:3])
+        own = [*map(EnclosedNumbers, np.split(middle, ends), np.split(radius, ends))]
+        first, early, late = (EnclosedNumbers(each.middle[0], each.radius[0]) for each in own[:3])
         return EnclosedPlant(first, early, late, own[3], own[4], self._at_rest())
 
     def _pole(self, m: complex) -> Ball:
@@ -222,7 +222,7 @@ class ArmBox:
         slope = (3 * drive[3] * d + 2 * drive[2]) * d + drive[1]
         return [(((e * d + c) * d + b) * d + a) / slope for a, b, c, e in outputs]
 
-    def _at_rest(self) -> Enclosure:
+    def _at_rest(self) -> EnclosedNumbers:
         """Return the coefficients of s^-2, s^-1 and 1 (outputs, 3) of each output at s = 0."""
         first = system_of(self.middle).at_rest
 
@@ -241,7 +241,7 @@ class ArmBox:
             for n in range(size, len(found), size):
                 quotient = flint.arb_series(found[n : n + 3], prec=3) / drive
                 rows.append([flint.arb(0)] * (2 - first) + [quotient[k] for k in range(first + 1)])
-        return enclosure(rows)
+        return enclosed_numbers(rows)
 
 
 def _union(a: Ball, b: Ball) -> Ball:
@@ -254,14 +254,14 @@ def _factor(k: System) -> Ball:
     return rational(math.prod(1 + each for each in ends))
 
 
-def enclosure(rows: Sequence[Sequence[Ball]]) -> Enclosure:
+def enclosed_numbers(rows: Sequence[Sequence[Ball]]) -> EnclosedNumbers:
     """Return rows of balls as floats with the radii around them.  Raises CertificationError for one without bounds."""
     middle = np.array([[nearest_float(flint.acb(each)) for each in row] for row in rows])
     pairs = zip(np.ravel(np.array(rows, dtype=object)).tolist(), middle.ravel().tolist(), strict=True)
     radius = np.array([_upper(abs(each - point(m))) for each, m in pairs]).reshape(middle.shape)
     if not np.isfinite(radius).all():
         raise CertificationError("the arms of the box differ too much")
-    return Enclosure(middle, radius)
+    return EnclosedNumbers(middle, radius)
 
 
 def _upper(ball: Ball) -> float:
