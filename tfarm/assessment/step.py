@@ -234,7 +234,8 @@ def step(
 
 def has_steps(reference: ReferenceShaping) -> bool:
     """Return whether a slew is few steps of a derivative, which the continuous-time loop is solved for."""
-    return reference.profile in STEPS_OF_PROFILE and reference.shaper == "none"
+    is_plain = (reference.shaper, reference.feedforward) == ("none", "rigid")
+    return is_plain and reference.profile in STEPS_OF_PROFILE
 
 
 def _references(task: Scenario, t: Real, hub: str, tip: str, reach: float) -> dict[str, Real]:

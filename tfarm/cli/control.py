@@ -299,7 +299,11 @@ def reference(
     shaper: str | None = None,
     profile: str | None = None,
     modes: Annotated[int | None, typer.Option("--modes", min=1, max=10)] = None,
+    feedforward: str | None = None,
     error: float = 0.3,
+    over: Annotated[
+        list[Any] | None, typer.Option("--range", parser=name_and(interval), metavar="KEY=LO,HI")
+    ] = None,
     loop: Any = load_loop,
     chain: Any = chain_of_options,
     show: Any = emit,
@@ -312,15 +316,19 @@ def reference(
     shaper: none, ZV, ZVD or EI; by default that of [reference] in the file
     profile: bang-bang, s-curve or polynomial; by default that of [reference]
     modes: the first flexible modes, which are shaped for; by default those of [reference], or two
+    feedforward: rigid, inverse (of the exact arm at its hub) or none; by default that of [reference]
     error: largest error of the frequencies, as a share
+    over: range of a number such as payload.mass or hub.inertia, over which the residual is bounded; may be repeated
     """
     case, defaults = loop(arm)
     own = chain(arm)
-    typed: Any = without_none({"shaper": shaper, "profile": profile, "modes": modes})
+    typed: Any = without_none(
+        {"shaper": shaper, "profile": profile, "modes": modes, "feedforward": feedforward}
+    )
     if profile is not None:
         typed["file"] = None
     case = case.through(replace(own, reference=replace(own.reference, **typed)))
-    show(case.reference(error=error), defaults)
+    show(case.reference(error=error, ranges=dict(over or [])), defaults)
 
 
 @command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")

@@ -447,7 +447,11 @@ class Slews:
         """
         slew = self.chain.slew
         reference = self.chain.reference
-        is_plain = (reference.profile, reference.shaper) == ("bang-bang", "none")
+        is_plain = (reference.profile, reference.shaper, reference.feedforward) == (
+            "bang-bang",
+            "none",
+            "rigid",
+        )
         remedy = (
             "the continuous-time residual is that of a bang-bang slew without a shaper: leave the table out"
         )
