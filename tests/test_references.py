@@ -349,19 +349,39 @@ def test_a_shaper_leaves_less_over_the_error_of_the_frequency():
     assert run.scenario.busy_until == pytest.approx(each.rise_time + each.added)
 
 
-def test_a_step_of_a_shaped_slew_is_the_simulation():
-    found = tfarm.step(LAB, LAW, shaped("ZV"), "slew", 2.0)
+def test_a_step_of_a_shaped_slew_is_the_simulation_and_a_sum_of_late_responses():
+    """In continuous time that to the profile, as many samples late as each impulse, times its size."""
+    found, plain = (tfarm.step(LAB, LAW, shaped(kind), "slew", 2.0) for kind in ("ZV", "none"))
     run = tfarm.simulate(LAB, LAW, shaped("ZV"), "slew", 2.0)
-    assert found.continuous is None
     every = round(found.period / found.t[1])
     np.testing.assert_allclose(found.sampled.signals["root_moment"][::every], run.at_samples.root_moment, atol=1e-9)
+    late = 0.0
+    for n, size in enumerate(impulses_of(LAB, shaped("ZV"), LAW).tolist()):
+        t = found.t - n * found.period
+        late = late + size * plain.response.at(np.maximum(t, 0.0)) * (t >= -1e-12)
+    for own, truth in zip(found.response.at(found.t), late, strict=True):
+        np.testing.assert_allclose(own, truth, rtol=0, atol=1e-9 * abs(truth).max())
 
 
-def test_the_continuous_time_response_to_an_s_curve_is_near_that_of_fast_samples():
-    found = tfarm.step(LAB, LAW, shaped(profile="s-curve", period=0.002), "slew", 1.5)
+@pytest.mark.parametrize("own", [{"profile": "s-curve"}, {"shaper": "ZVD"}])
+def test_the_continuous_time_response_to_a_slew_is_near_that_of_fast_samples(own):
+    found = tfarm.step(LAB, LAW, shaped(**own, period=0.002), "slew", 1.5)
     for name in ("hub_angle", "tip_displacement", "root_moment"):
         y, held = found.continuous.signals[name], found.sampled.signals[name]
         assert abs(y - held[: y.size]).max() < 0.01 * abs(held).max()
+
+
+def test_a_study_has_the_shaped_slew_of_each_arm(tmp_path):
+    """That of `step`, with the impulses of the arm itself."""
+    law, key = tfarm.HubFeedback(K1=3.0, K2=0.15), "step.sampled.tip.settling_time_s"
+    over = {"payload.mass": {"values": [0.1]}}
+    found = []
+    for kind in ("none", "ZVD"):
+        study = tfarm.study(LAB, over, [key], law, shaped(kind), out=tmp_path / kind, draws=1, workers=1)
+        truth = tfarm.step(LAB.having(payload_mass=0.1), law, shaped(kind), "slew")
+        assert study.table()[key].tolist() == [truth.sampled.tip.settling_time]
+        found.append(truth.busy_until)
+    assert found[1] > found[0]
 
 
 def test_the_command_is_the_function(capsys):

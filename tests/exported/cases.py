@@ -8,7 +8,7 @@ import numpy as np
 import tfarm
 from tfarm.arm.law_tables import load_law
 from tfarm.case import Case
-from tfarm.dsp import Actuator, Chain, Converters, Sampling, load_chain
+from tfarm.dsp import Actuator, Chain, Converters, ReferenceShaping, Sampling, load_chain
 from tfarm.dsp.kernel import AMPLIFIER, ENCODER
 from tfarm.dsp.simulate import quantisers
 from tfarm.exported.controller import controller_of, in_z
@@ -37,6 +37,7 @@ CASES = {  # arm, law, chain
     "integral": (LAB, PI, IDEAL),
     "notch": (LAB, NOTCH, replace(REAL, converters=replace(REAL.converters, hub_rate="ideal"))),
     "estimate": (LAB, GAINS, REAL),
+    "shaped": (LAB, PI, replace(IDEAL, reference=ReferenceShaping(shaper="EI"))),
     "windup": (LAB, replace(PI, anti_windup=0.5), replace(IDEAL, actuator=Actuator(torque_limit=0.5))),
 }
 

@@ -14,7 +14,7 @@ from tests.exported.cases import CASES, GAINS, IDEAL, LAB, readings, realised, t
 from tests.exported.compilers import build, needed, random_inputs, run, stepped
 from tests.shared import thinned
 from tfarm.case import Case
-from tfarm.dsp.scenarios import scenario
+from tfarm.dsp.scenarios import slew_scenario
 from tfarm.dsp.simulate import Simulator
 from tfarm.errors import ParameterError
 from tfarm.exported.controller import c_controller
@@ -76,13 +76,15 @@ def test_a_refused_sample_holds_the_output_and_keeps_the_state(exported):
 @pytest.mark.parametrize("precision", ["double", "float"])
 @pytest.mark.parametrize("case", CASES)
 def test_the_code_is_the_simulation(case, precision):
-    """Fed with the signals of a simulated slew it has that simulation's torque, in the last bit."""
+    """Fed with the signals of a simulated slew it has that simulation's torque, in the last bit; shaped ones are
+    references before the shaper, whose sums NumPy rounds in another order."""
     arm, law, chain = CASES[case]
     arithmetic = {"double": "float64", "float": "float32"}[precision]
     chain = replace(chain, converters=replace(chain.converters, arithmetic=arithmetic))
-    controller, _ = realised(task_of((arm, law, chain), precision))
-    slew = scenario("slew", arm, chain, 1.5)
-    own = Simulator(Case(arm, controller.word.rounded_law, chain), slew, count=6)
+    task = task_of((arm, law, chain), precision)
+    controller, _ = realised(task)
+    slew = slew_scenario(arm, chain, 1.5)
+    own = Simulator(Case(arm, controller.word.rounded_law, chain), slew.through(task.impulses), count=6)
     done = own.run()
     signals = readings(done)
     columns = [signals[name] for name in controller.signals]
@@ -93,7 +95,8 @@ def test_the_code_is_the_simulation(case, precision):
     inputs = np.stack([*columns, slew.feedforward], axis=1).astype(kind).astype(float)
     outputs, _ = controller.run(inputs)
     late = round(law.delay / chain.sampling.period) if isinstance(law, tfarm.Law) else 0
-    assert abs(outputs[late:] - done.torque[: len(outputs) - late]).max() == 0
+    off = abs(outputs[late:] - done.torque[: len(outputs) - late]).max()
+    assert off <= (case == "shaped") * 64 * np.finfo(kind).eps * abs(done.torque).max()
     assert abs(done.torque).max() > 0.1
 
 

@@ -1,6 +1,7 @@
 """The exported state spaces against the analysis, the simulator, python-control's interconnection and aliasing."""
 
 import math
+import runpy
 from zipfile import ZipFile
 
 import control
@@ -11,8 +12,8 @@ import tfarm
 from tfarm import HubFeedback, Law
 from tfarm.arm import AT_HUB
 from tfarm.case import Case
-from tfarm.dsp import Actuator, Chain, Converters, Sampling
-from tfarm.dsp.scenarios import scenario
+from tfarm.dsp import Actuator, Chain, Converters, ReferenceShaping, Sampling
+from tfarm.dsp.scenarios import scenario, slew_scenario
 from tfarm.dsp.simulate import Simulator
 from tfarm.exported.systems import controller_system, loop_system, plant_system, reduced_systems
 from tfarm.loop.sampled import sampled_loop
@@ -93,6 +94,19 @@ def test_the_loop_steps_as_the_simulation_does(law, chain, name):
     y = dict(zip(loop.outputs, np.array(y).T, strict=True))
     for mine, theirs in (("hub_torque", found.torque), ("tip_displacement", found.at_samples.tip_displacement)):
         assert y[mine] == pytest.approx(theirs, rel=0, abs=1e-9 * abs(theirs).max())  # 80 samples of two orders of sums
+
+
+def test_a_loop_behind_its_shaper_is_the_shaped_slew(tmp_path):
+    """The script of python-control: each reference and the feedforward through `shaper`, then the loop."""
+    law, chain = CASES["gains"][0], Chain(reference=ReferenceShaping(shaper="ZVD"))
+    tfarm.export(LAB, law, what="loop", form="py", folder=tmp_path, chain=chain)
+    own, task = runpy.run_path(str(tmp_path / "loop.py")), slew_scenario(LAB, chain, 1.2)
+    known = {"feedforward": task.feedforward} | {f"reference:{key}": value for key, value in task.references.items()}
+    late = [control.forced_response(own["shaper"], U=known[each]).y[0] for each in own["loop"].input_labels]
+    found = control.forced_response(own["loop"], U=np.array(late)).y
+    truth = tfarm.simulate(LAB, law, chain, "slew", 1.2)
+    torque = found[own["loop"].output_labels.index("hub_torque")]
+    assert torque == pytest.approx(truth.torque, rel=0, abs=1e-6 * abs(truth.torque).max())
 
 
 def test_reduced_models_are_within_their_error():

@@ -22,7 +22,7 @@ from tests.exported.laws import some_law
 from tests.survey import Finding
 from tfarm.arm.law import REFERENCE
 from tfarm.case import Case
-from tfarm.dsp import Actuator, Converters
+from tfarm.dsp import Actuator, Converters, ReferenceShaping
 from tfarm.errors import ConvergenceError, ParameterError
 from tfarm.exported.controller import in_z, word_length
 from tfarm.exported.kernel import Status
@@ -34,13 +34,14 @@ WHOLE = np.vectorize(lambda value: round(Fraction(value) * 2**DIGITS), otypes=[o
 
 
 def some_chain(rng):
-    """A chain with, at times, a DAC, a range or a limit of the output, and an estimated hub rate."""
+    """A chain with, at times, a DAC, a range or a limit of the output, an estimated hub rate, and a shaper."""
     bits = int(rng.integers(6, 17)) if rng.random() < 0.5 else None
     span = float(rng.uniform(0.3, 5.0)) if bits or rng.random() < 0.3 else None
     limit = float(rng.uniform(0.2, 4.0)) if rng.random() < 0.3 else np.inf
     rate = {"encoder_counts": 8192, "hub_rate": "difference", "rate_filter": float(rng.choice([20.0, 200.0, np.inf]))}
     converters = Converters(torque_bits=bits, torque_range=span, **(rate if rng.random() < 0.3 else {}))
-    return replace(IDEAL, converters=converters, actuator=Actuator(torque_limit=limit))
+    shaping = ReferenceShaping(shaper=str(rng.choice(["none", "none", "ZV", "EI"])), modes=int(rng.integers(1, 3)))
+    return replace(IDEAL, converters=converters, actuator=Actuator(torque_limit=limit), reference=shaping)
 
 
 def some_task(rng):
@@ -66,8 +67,16 @@ def some_task(rng):
     return ExportTask(case=Case(LAB, law, chain), what="controller", form="c", ranges=ranges, anyway=True)
 
 
+def shaped(task, controller, inputs):
+    """Whole inputs (n, k), references and feedforward through the impulses of their shaper."""
+    found, impulses = inputs.copy(), WHOLE(task.impulses)
+    for j in range(len(controller.signals), controller.inputs):
+        found[:, j] = np.convolve(inputs[:, j], impulses)[: len(inputs)] >> DIGITS
+    return found
+
+
 def columns_of(task, controller, inputs):
-    """Whole numbers e (n, columns) of whole inputs (n, k), by the definition of the law."""
+    """Whole numbers e (n, columns) of whole inputs (n, k) behind a shaper, by the definition of the law."""
     law, names = task.case.law, [*controller.signals, *controller.references]
     count, known = len(controller.signals), {}
     for j, name in enumerate(names):
@@ -168,7 +177,10 @@ def judged(rng, task, kind):
     if found.error is None:
         return Finding(f"{kind}, not determined")
     names = [*controller.signals, *controller.references]
-    sizes = np.array([*(controller.ranges.get(name, 1.0) for name in names), controller.word.feedforward])
+    word = controller.word
+    sizes = np.array(
+        [*(controller.ranges.get(name, 1.0) for name in names), controller.ranges.get("feedforward", word.output)]
+    )
     share, reach, words = 0.0, 0.0, ""
     for shares in worst_inputs(rng, task, controller, 300):
         values = shares * sizes
@@ -178,7 +190,7 @@ def judged(rng, task, kind):
         values[:, -1] = halfway(rng, task, controller, values, sizes)
         own, exact = in_kind(controller, values, sizes)
         law = in_z(task.case)
-        whole = WHOLE(exact)
+        whole = shaped(task, controller, WHOLE(exact))
         truth = output_of(law, columns_of(task, controller, whole)) + whole[:, -1]
         size, level, fault = compared(controller, own, truth, bounds.error)
         share, reach, words = max(share, size), max(reach, level / bounds.output), words or fault
@@ -189,6 +201,7 @@ def judged(rng, task, kind):
         else ""
     )
     outcome = f"{kind}{', DAC' if controller.dac[0] else ''}{', estimate' if controller.hub else ''}"
+    outcome += ", shaper" * bool(controller.shaped)
     return Finding(outcome, words, is_wrong, {f"error over bound, {outcome}": share, "output over its bound": reach})
 
 
@@ -204,7 +217,7 @@ def halfway(rng, task, controller, values, sizes):
     if not step or rng.random() < 0.5:
         return r
     _, exact = in_kind(controller, values, sizes)
-    whole = WHOLE(exact)
+    whole = shaped(task, controller, WHOLE(exact))
     u = output_of(in_z(task.case), columns_of(task, controller, whole))
     u = np.array([float(Fraction(int(each), 2**DIGITS)) for each in u])
     middle = (np.rint((u + r) / step - 0.5) + 0.5) * step * (1 + rng.choice([-1e-7, 0.0, 1e-7], r.size))

@@ -6,6 +6,7 @@ arm's own moment less the rigid arm's after the slew, by matrix exponentials of 
 """
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,17 +21,21 @@ from tests.synthesis.designs import excess
 from tests.synthesis.held_loop import HeldLoop
 from tests.synthesis.judged import judge_of
 from tfarm import ConvergenceError, HubFeedback, ParameterError, tuner
-from tfarm.arm import TWO_GAINS
+from tfarm.arm import AT_HUB, TWO_GAINS
 from tfarm.arm.chain import Sampling
 from tfarm.case import Case
-from tfarm.dsp import Chain, Slew
+from tfarm.dsp import Chain, ReferenceShaping, Simulator, Slew
 from tfarm.dsp.results import simulate_scenario
+from tfarm.dsp.scenarios import slew_scenario
+from tfarm.dsp.shaping import impulses_of
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.reduced import modal_model
 from tfarm.schema import to_dict
+from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis import search
 from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import RESERVE
+from tfarm.synthesis.judge import judge_of as make_judge
 from tfarm.synthesis.structures import structure_of
 from tfarm.tuner.baselines import best_constant
 from tfarm.tuner.trial import slew_trial
@@ -188,6 +193,21 @@ def by_exponentials(arm, law, chain, duration, count):
     return np.sqrt(np.mean(left**2))
 
 
+@pytest.mark.parametrize("kind", ["ZV", "EI"])
+def test_the_shaper_of_another_arm_is_that_of_the_nominal_one(kind):
+    """By the simulation of the other arm under the references of the laboratory arm, whose impulses are longer."""
+    chain, heavy = Chain(reference=ReferenceShaping(shaper=kind)), LAB.having(payload_mass=0.15)
+    law = HubFeedback(K1=0.5, K2=0.1, Kp=2.0)
+    judges = [make_judge(arm, LAB, chain, "residual", tuple(AT_HUB), 2, 8) for arm in (LAB, heavy)]
+    for judge, arm in zip(judges, (LAB, heavy), strict=True):
+        task = slew_scenario(LAB, chain, 3.0).through(impulses_of(LAB, chain, law))
+        run = Simulator(Case(arm, law, chain), task, count=8).run()
+        left = max(2 * math.pi / first_frequency(arm), 0.16)
+        is_counted = (run.t >= task.busy_until - 1e-9) & (run.t <= task.busy_until + left + 1e-9)
+        moment = (run.at_samples.root_moment - task.rigid_moment)[is_counted]
+        assert judge.score(law) == pytest.approx(math.sqrt(np.mean(moment**2)), rel=1e-8)
+
+
 @pytest.mark.parametrize("chain", CHAINS, ids=NAMED)
 def test_a_simulation_finds_the_arms_own_moment_less_the_rigid_arms(chain):
     law = HubFeedback(K1=0.5, K2=0.15, Kp=2.0)
@@ -199,6 +219,7 @@ PROMISED = [(chain, {"K1": (0.1, 3.0), "K2": (-0.5, 0.5)}) for chain in CHAINS]
 PROMISED += [
     (CHAINS[-1], {"structure": "PD"}),
     (Chain(sampling=Sampling(period=0.008, delay_samples=0.5), slew=Slew(rise_time=0.5, travel=0.4)), {"Kp": 4.0}),
+    (Chain(reference=ReferenceShaping(shaper="ZV")), {}),
 ]
 
 

@@ -19,7 +19,7 @@ from tfarm.arm import TWO_GAINS
 from tfarm.arm.chain import Converters
 from tfarm.arm.law_tables import load_law
 from tfarm.case import Case
-from tfarm.dsp import Chain
+from tfarm.dsp import Chain, ReferenceShaping
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.schema import text
@@ -285,16 +285,19 @@ def test_poles_of_a_rate_that_is_a_difference_are_those_of_the_sampled_loop():
 SMALL = tfarm.load(Path(__file__).parents[1] / "data" / "reproductions" / "r3.toml")  # its unit of torque is 0.3 N m
 
 
-@pytest.mark.parametrize(("arm", "gain"), [(LAB, 0.0), (LAB, 0.2), (SMALL, 0.2)])
-def test_the_cost_is_that_of_the_tuners_trial_with_a_constant_gain(arm, gain):
-    """Its trial has six modes and ideal converters, as the judge here."""
+@pytest.mark.parametrize(
+    ("arm", "gain", "shaper"), [(LAB, 0.0, "none"), (LAB, 0.2, "none"), (SMALL, 0.2, "none"), (LAB, 0.0, "ZVD")]
+)
+def test_the_cost_is_that_of_the_tuners_trial_with_a_constant_gain(arm, gain, shaper):
+    """Its trial has six modes and ideal converters, as the judge here, and a shaper for the loop without that gain."""
+    chain = Chain(reference=ReferenceShaping(shaper=shaper))
     law = Law(
         {"hub_angle": 4.0, "hub_rate": 2.0, "root_moment": gain}, references=("hub_angle", "hub_rate", "root_moment")
     )
     plan = usual_plan(arm)
     cost = Cost(a=plan.cost.a / plan.scale**2, b=plan.cost.b / plan.scale**2)
-    trial = slew_trial(arm, K1=2.0, Kp=4.0, cost=cost, duration=plan.duration)
-    score = judge_of(arm, law, "cost", count=6).score(law)
+    trial = slew_trial(arm, chain, K1=2.0, Kp=4.0, cost=cost, duration=plan.duration)
+    score = judge_of(arm, law, "cost", chain, count=6).score(law)
     assert score == pytest.approx(trial.with_constant(gain).cost, rel=1e-9)
 
 

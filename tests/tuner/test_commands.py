@@ -57,6 +57,26 @@ def lateness(arm, period):
     return {"ZV": period * samples(1), "EI": period * samples(2)}
 
 
+def test_a_shaped_slew_is_that_of_the_shaper_without_moment_feedback(capsys, tmp_path):
+    """Tuned on it, with the baselines of the plain slew; the saved tuner meets the same slew in the simulator."""
+    chain, file = tmp_path / "chain.toml", tmp_path / "tuner.json"
+    chain.write_text('[reference]\nshaper = "ZV"\n')
+    options = ("tune", "sasaki2012-lab", "--trials", "3")
+    plain = answer(capsys, *options)
+    found = answer(capsys, *options, "--dsp", str(chain), "--save", str(file))
+    assert found["cost_without"] == pytest.approx(plain["shaped"]["ZV"]["cost"], rel=1e-9)
+    assert found["shaped"]["ZV"]["cost"] == pytest.approx(found["cost_without"], rel=1e-9)
+    assert found["shaped"]["ZV"]["arrives_later_by_s"] == pytest.approx(0.0, abs=1e-12)
+    assert found["shaped"]["EI"]["cost"] == pytest.approx(plain["shaped"]["EI"]["cost"], rel=1e-9)
+    assert found["cost_lq_bound"] < found["cost_best_constant"] <= found["cost_without"]
+    words = ("simulate", "sasaki2012-lab", "--controller", str(file), "--modes", "6", "--dsp", str(chain))
+    simulated = answer(capsys, *words)
+    np.testing.assert_allclose(simulated["gain"], found["gain"]["K"], atol=1e-11)
+    assert simulated["residual_moment_rms"] == pytest.approx(found["residual_moment_rms"], rel=1e-9)
+    words = ("export", "sasaki2012-lab", "--what", "tuner", "--as", "c", "--tuned", str(file), "--dsp", str(chain))
+    assert "reference.shaper = 'ZV'" in refused(capsys, *words, "--out", str(tmp_path / "out"))
+
+
 def test_without_a_guard_the_upper_end_is_inf_and_a_divergence_is_reported(capsys):
     options = ("tune", "sasaki2012-lab", "--guard", "none", "--rule", "plain", "--seed", "3", "--curves", "2")
     code, out, err = run(capsys, *options, "--json")

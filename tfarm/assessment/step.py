@@ -18,7 +18,7 @@ from typing import Annotated
 import numpy as np
 
 from tfarm.arm import AT_HUB, AnyLaw, Arm, Law
-from tfarm.arm.chain import PERIOD, ReferenceShaping
+from tfarm.arm.chain import PERIOD
 from tfarm.arm.checks import number
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.stages import Consumer
@@ -31,6 +31,7 @@ from tfarm.dsp.profiles import ACCELERATION_STEPS, JERK_STEPS
 from tfarm.dsp.results import simulate_modes
 from tfarm.dsp.scenarios import TRIAL_SLEWS, Scenario, describe_scenario, rest_scenario, scenario
 from tfarm.dsp.sensed import sensed_plant
+from tfarm.dsp.shaping import impulses_of
 from tfarm.dsp.simulate import MOST_BETWEEN, first_mode
 from tfarm.dsp.simulation import SETTLING_BAND
 from tfarm.dsp.stages import admit_case, not_covered
@@ -85,10 +86,9 @@ STEPS_OF_PROFILE = {"bang-bang": (2, *ACCELERATION_STEPS), "s-curve": (3, *JERK_
 class Step(LoopRecord):
     """Time responses of an arm under a controller, continuous-time and sampled, at the times `t` [s].
 
-    A law in z has no continuous-time loop, and a slew through a shaper, or of a polynomial or a file, no response of
-    it; the signals of a sampled loop end where it was stopped.  `names` are the signals of hub and tip, root moment and
-    torque, `reference` is that of hub and tip, `response` the continuous-time response at any time, `busy_until` [s]
-    the end of the input.
+    A law in z has no continuous-time loop, and a slew of a polynomial or a file no response of it; the signals of a
+    sampled loop end where it was stopped.  `names` are the signals of hub and tip, root moment and torque, `reference`
+    is that of hub and tip, `response` the continuous-time response at any time, `busy_until` [s] the end of the input.
     """
 
     controller: Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]
@@ -210,7 +210,9 @@ def step(
             sensed_plant(arm, Chain(), ("tip_displacement",), 1).unfiltered, task.tip_offset, scenario_name
         )
     response = None
-    if poles is not None and (task.name != "slew" or has_steps(chain.reference)):
+    reference_of = chain.reference
+    has_steps = reference_of.profile in STEPS_OF_PROFILE and reference_of.feedforward == "rigid"
+    if poles is not None and (task.name != "slew" or has_steps):
         response = time_response(poles, names, excitation(poles.loop, case, task, names), length)
     t = _times(response, task)
     reference = _references(task, t, hub, tip, arm.reach)
@@ -230,12 +232,6 @@ def step(
         sampled=sampled,
         continuous=continuous,
     )
-
-
-def has_steps(reference: ReferenceShaping) -> bool:
-    """Return whether a slew is few steps of a derivative, which the continuous-time loop is solved for."""
-    is_plain = (reference.shaper, reference.feedforward) == ("none", "rigid")
-    return is_plain and reference.profile in STEPS_OF_PROFILE
 
 
 def _references(task: Scenario, t: Real, hub: str, tip: str, reach: float) -> dict[str, Real]:
@@ -332,7 +328,7 @@ def excitation(loop: ContinuousLoop, case: Case, task: Scenario, names: Sequence
     if task.name == "reference":
         hub = angle if task.hub_angle[0] else rate
         return Excitation(_inputs(law, {hub: lambda s: 1 / s}))
-    # of the acceleration in steps, or of the jerk
+    # of the acceleration in steps, or of the jerk, once for each impulse of the shaper
     order, shares, sizes = STEPS_OF_PROFILE[case.chain.reference.profile]
     read = arm.gauged_inertia * float(task.reading == "vibration")
     references: dict[str, Transform] = {
@@ -344,9 +340,13 @@ def excitation(loop: ContinuousLoop, case: Case, task: Scenario, names: Sequence
         ACTUATOR: lambda s: arm.turned_inertia / s ** (order - 1) + arm.rate_loss / s**order,
     }
     turn = case.chain.slew.travel_of(arm.reach) / arm.reach
-    weights = (size * turn / rise**order for size in sizes)
-    times = (share * rise for share in shares)
-    return Excitation({**_inputs(law, references), **feedforward}, tuple(times), tuple(weights))
+    impulses = impulses_of(arm, case.chain, law)
+    (samples,) = np.nonzero(impulses)
+    weights = np.outer(impulses[samples], sizes) * turn / rise**order
+    times = np.add.outer(samples * task.period, np.array(shares) * rise)
+    return Excitation(
+        {**_inputs(law, references), **feedforward}, tuple(times.ravel()), tuple(weights.ravel())
+    )
 
 
 def _inputs(law: Law, references: Mapping[str, Transform]) -> dict[str, Transform]:

@@ -33,6 +33,8 @@ from tfarm.dsp.pulse import PulseTransfer
 from tfarm.dsp.sensed import sensed_plant
 
 MOMENT = AT_HUB[2]
+# of the law, over which the poles are followed from those of the arm alone
+SHARES = np.linspace(0.0, 1.0, 25)
 
 
 def zero_vibration(z: complex) -> Real:
@@ -99,22 +101,38 @@ def loop_modes(case: Case, count: int = USUAL_MODES) -> dict[int, complex]:
     pulse = PulseTransfer(sensed.together, chain.sampling).without_fast_poles()
     A, B, C = pulse.matrices()
     own, read, row, through = in_z.matrices
-    alone = np.block([[A, np.zeros((len(A), len(own)))], [read @ C, own]])
+    open_loop = np.block([[A, np.zeros((len(A), len(own)))], [read @ C, own]])
     push = np.r_[B, np.zeros(len(own))]
     fed_back = np.outer(push, np.r_[through.sum(axis=0) @ C, row.sum(axis=0)])
-    # of the continuation from the arm alone
-    steps = np.linspace(0.0, 1.0, 25)
-    poles = [np.linalg.eigvals(alone - share * fed_back).astype(complex) for share in steps.tolist()]
+    return modes_under(open_loop - np.multiply.outer(SHARES, fed_back), modes_alone(pulse))
+
+
+def modes_alone(pulse: PulseTransfer) -> dict[int, complex]:
+    """Return the pole z, Im z > 0, of each mode of an arm alone below half the sampling rate, by its number."""
     is_below = (pulse.poles.imag > 0) & (pulse.poles.imag * pulse.sampling.period < math.pi)
-    (upper,) = np.nonzero(is_below & (pulse.mode > 0))
-    starts = match_poles(pulse.multipliers[upper], poles[0])
-    ends = follow_branches(poles, steps)[-1][starts].tolist()
+    upper = is_below & (pulse.mode > 0)
+    return dict(zip(pulse.mode[upper].tolist(), pulse.multipliers[upper].tolist(), strict=True))
+
+
+def modes_under(matrices: Real, alone: dict[int, complex]) -> dict[int, complex]:
+    """Return the same of a loop, followed from those of the arm alone over matrices (shares, n, n) of a growing law.
+
+    An overdamped mode has none, and one that decays to 0.1 % in half a period.
+    """
+    poles = np.linalg.eigvals(matrices).astype(complex)
+    starts = match_poles(np.array([*alone.values()], complex), poles[0])
+    ends = follow_branches([*poles], SHARES)[-1][starts].tolist()
     # a shaper for the conjugate is the same
-    found = {
-        mode: complex(z.real, abs(z.imag)) for mode, z in zip(pulse.mode[upper].tolist(), ends, strict=True)
-    }
+    found = {mode: complex(z.real, abs(z.imag)) for mode, z in zip(alone, ends, strict=True)}
+    # 0.1 % of its vibration is left after half a period: a shaper would only take time
+    fastest = math.log(1e3) / math.pi
+    return {mode: found[mode] for mode in sorted(found) if decay_of(found[mode]) < fastest}
+
+
+def decay_of(z: complex) -> float:
+    """Return the decay of a pole over its angle, -ln|z|/arg z; infinite of a real one."""
     # 1e-9: of a real pole
-    return {mode: found[mode] for mode in sorted(found) if found[mode].imag > 1e-9}
+    return -math.log(abs(z)) / float(np.angle(z)) if z.imag > 1e-9 else math.inf
 
 
 def impulses_at(poles: dict[int, complex], kind: str, modes: int) -> Real:

@@ -2,10 +2,10 @@
 
     e = reference - signal,  u = feedforward + C x + D e,  x = A x + B e
 
-in double, float or Q31, in the realisation with the least round-off noise, with the DAC, the limit of the actuator and
-the delay of the law as the simulation has them.  The loop is judged with the coefficients as they are exported.  A step
-refuses inputs that are not finite, and results that are not: it holds the output and keeps the states.  Its status
-names a clipped output and, in fixed point, a clipped state.
+in double, float or Q31, in the realisation with the least round-off noise, with the DAC, the limit of the actuator, the
+delay of the law, and the shaper of references and feedforward as the simulation has them.  The loop is judged with the
+coefficients as they are exported.  A step refuses inputs that are not finite, and results that are not: it holds the
+output and keeps the states.  Its status names a clipped output and, in fixed point, a clipped state.
 """
 
 import math
@@ -41,7 +41,9 @@ from tfarm.exported.word_length import (
     MOST_SUMMED,
     OUTPUT,
     RATE,
+    ShaperCode,
     Word,
+    shaper_code,
     word_of,
 )
 from tfarm.records import frozen
@@ -52,6 +54,7 @@ CONSUMER = Consumer(
     acts=(
         "anti-alias filter",
         "hub rate",
+        "shaper",
         "law",
         "DAC steps",
         "DAC range",
@@ -63,7 +66,7 @@ CONSUMER = Consumer(
     ),
     named=("encoder", "amplifier steps", "arithmetic"),
     partly=("amplifier range",),
-    none=("reference", "shaper", "volts"),
+    none=("reference", "volts"),
 )
 
 # in C
@@ -151,6 +154,7 @@ class Controller:
     delay: int
     hub: tuple[float, float] | None
     back: Real
+    shaper: ShaperCode
 
     @cached_property
     def plan(self) -> Whole:
@@ -169,6 +173,11 @@ class Controller:
     def inputs(self) -> int:
         """The number of inputs, the last of which is the feedforward."""
         return len(self.signals) + len(self.references) + 1
+
+    @property
+    def shaped(self) -> int:
+        """The number of inputs through the shaper, the last ones: references and feedforward."""
+        return len(self.references) + 1 if self.shaper.lags.size else 0
 
     @property
     def whole_dac(self) -> Whole:
@@ -198,11 +207,13 @@ class Controller:
         table = np.ascontiguousarray(word.table, dtype=kind)
         inputs = np.ascontiguousarray(inputs, dtype=kind)
         if is_fixed:
-            run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, outputs, status)
+            through = (self.shaper.lags, self.shaper.sizes, self.shaped, self.shaper.shift)
+            run_fixed(table, word.shifts, self.plan, inputs, self.whole_dac, *through, outputs, status)
         else:
             hub = np.array([self.signals.index(ANGLE), *self.hub] if self.hub else [-1.0, 0.0, 1.0])
             is_single = word.precision == "float"
-            run_real(table, self.plan, inputs, self.dac, self.back, hub, is_single, outputs, status)
+            through = (self.shaper.lags, self.shaper.sizes, self.shaped, is_single)
+            run_real(table, self.plan, inputs, self.dac, self.back, hub, *through, outputs, status)
         # a refused sample moves no delay line: the output is held
         is_good = ~np.isin(status, (Status.INPUT_ERROR, Status.OVERFLOW))
         line = np.r_[np.zeros(1 + self.delay, kind), outputs[is_good]]
@@ -333,7 +344,8 @@ def controller_of(law: Law, task: ExportTask) -> Controller:
     usual = {"root_moment": of.moment_range, OUTPUT: limit if math.isfinite(limit) else None}
     ranges = {name: size for name, size in usual.items() if size} | dict(task.ranges)
     hub = (math.exp(-of.rate_filter * T), T) if is_estimated else None
-    word = word_of(law, task.precision, ranges, float(dac[0]), hub)
+    shaper = shaper_code(task.impulses, task.precision)
+    word = word_of(law, task.precision, ranges, float(dac[0]), hub, shaper)
     # in fixed point a step of the DAC is a power of 2 of those of the output
     steps = math.log2(max(1.0, float(dac[0]) / word.output * 2.0**31))
     remedy = f"q31 has steps of a DAC that are a power of 2 of its own: output={limit!r}, or this times a power of 2"
@@ -344,7 +356,7 @@ def controller_of(law: Law, task: ExportTask) -> Controller:
     require(is_exported, "law.anti_windup", law.anti_windup, remedy)
     if task.precision != FIXED:
         back = back.astype(FLOATS[task.precision][0]).astype(float)
-    return Controller(word, signals, references, ranges, dac, round(law.delay / T), hub, back)
+    return Controller(word, signals, references, ranges, dac, round(law.delay / T), hub, back, shaper)
 
 
 # ------------------------------------------------------------ values of the templates
@@ -359,7 +371,11 @@ def template_values(task: ExportTask, controller: Controller, ports: Sequence[Po
     dac = controller.whole_dac if is_fixed else controller.dac
     unit = arm.input_unit
     cast, zero = ("(int64_t)", "") if is_fixed else ("", f"0.0{suffix}")
-    known = [*(f"{cast}input->{each.identifier}" for each in ports), f"({real})rate", zero]
+    known = [f"{cast}input->{each.identifier}" for each in ports]
+    shaper = controller.shaper
+    first = len(ports) - controller.shaped
+    known[first:] = [f"r[{n}]" for n in range(controller.shaped)]
+    known += [f"({real})rate", zero]
     return {
         "fixed": is_fixed,
         "real": real,
@@ -368,6 +384,12 @@ def template_values(task: ExportTask, controller: Controller, ports: Sequence[Po
         "suffix": suffix,
         "cast": cast,
         "fields": ports,
+        "shaped": ports[first:],
+        "length": max(shaper.lags.tolist(), default=0) + 1,
+        "lags": shaper.lags.tolist(),
+        "impulses": [literal(each, suffix) for each in shaper.sizes.tolist()],
+        "shift": shaper.shift,
+        "feedforward": known[len(ports) - 1],
         **self_test_values(controller.run, ports, task.precision),
         "header": "controller.h",
         "n": word.law.order,
@@ -411,15 +433,16 @@ def ports_of(task: ExportTask, controller: Controller, *known: dict[str, str]) -
     if controller.hub and RATE in ranges:
         steps = f", at most {ranges[RATE] * controller.hub[1]!r} a sample"
     over = ", over {!r}".format if word.precision == FIXED else lambda size: ""
+    before = ", before the shaper" if controller.shaped else ""
     found = []
-    for title, names in zip(("", "reference of "), known, strict=True):
+    for title, own_words, names in zip(("", "reference of "), ("", before), known, strict=True):
         for name, own in names.items():
             size = ranges.get(name, 1.0)
             unit = OUTPUTS[name.partition("@")[0]].unit
             step = steps if name == ANGLE else ""
-            found.append(Port(own, f"{title}{name} [{unit}]{step}{over(size)}", size))
-    text = f"{FEEDFORWARD} [{task.case.arm.input_unit}]{over(word.output)}"
-    return [*found, Port(FEEDFORWARD, text, word.feedforward)]
+            found.append(Port(own, f"{title}{name} [{unit}]{own_words}{step}{over(size)}", size))
+    text = f"{FEEDFORWARD} [{task.case.arm.input_unit}]{before}{over(word.output)}"
+    return [*found, Port(FEEDFORWARD, text, ranges.get(FEEDFORWARD, word.output))]
 
 
 def self_test_values(

@@ -45,6 +45,7 @@ CONSUMER = Consumer(
         "anti-alias filter",
         "encoder",
         "hub rate",
+        "shaper",
         "amplifier steps",
         "amplifier range",
         "law",
@@ -57,7 +58,7 @@ CONSUMER = Consumer(
         "hub damping",
         "plant",
     ),
-    none=("reference", "shaper", "volts"),
+    none=("reference", "volts"),
 )
 
 MEASURED = "measured:"

@@ -15,9 +15,11 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.chain import file_text
+from tfarm.arrays import Real
 from tfarm.assessment.card import loop_card
 from tfarm.case import Case
 from tfarm.dsp import Chain
+from tfarm.dsp.shaping import impulses_of
 from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, must_be_known, require
 from tfarm.exported.texts import facts_of
@@ -70,6 +72,11 @@ class ExportTask:
         text = json.dumps(inputs, sort_keys=True, default=lambda a: a.tolist())
         return hashlib.sha256(text.encode()).hexdigest()
 
+    @cached_property
+    def impulses(self) -> Real:
+        """The impulses of the shaper, for the law as given, as `simulate` has them."""
+        return impulses_of(self.case.arm, self.case.chain, self.case.law)
+
     def analysis(self, case: Case) -> Analysis:
         """Return the sampled loop of a case, mostly that of the task with its numbers as rounded in the files.
 
@@ -101,6 +108,13 @@ class ExportTask:
     def facts(self, case: Case, found: Analysis) -> dict[str, str]:
         """Return the facts that a file begins with, by label: arm, law, stability and margins of the loop, version."""
         sampling = self.case.chain.sampling
+        reference = self.case.chain.reference
+        shaper = {}
+        if reference.shaper != "none":
+            end = (self.impulses.size - 1) * sampling.period
+            shaper = {
+                "shaper": f"{reference.shaper}, modes: {reference.modes}, last impulse after {end:.6g} s"
+            }
         shown = {}
         with suppress(ConvergenceError):
             shown = dict(facts_of(loop_card("sampled", case, found)))
@@ -110,6 +124,7 @@ class ExportTask:
             **({} if is_certified(found) else {"warning": ANYWAY}),
             "sampling period [s]": repr(sampling.period),
             "delay beyond this code [samples]": repr(sampling.delay_samples),
+            **shaper,
             **shown,
             "SHA-256 of the inputs": self.sha256,
             "tfarm": version("tfarm"),

@@ -5,7 +5,8 @@ With the references w and a feedforward r the sampled loop of the plant x and th
     u = r + c k + d [y; w],   k_next = a k + b [y; w],   x_next = A x + B u,   y = C x
 
 A quantity of the loop acts as in `tfarm.loop.sampled`: delay, hold and analog filters are states of the plant, the
-estimate of a hub rate is one of the controller.  Quantisation and saturation are not linear and not in it.
+estimate of a hub rate is one of the controller.  A shaper is a system of its own: references and feedforward are those
+behind it, so that each of them passes it before.  Quantisation and saturation are not linear and not in it.
 
 They are written as a MATLAB file with its script, whose variables are the entries of the first system, a structure for
 each other one, and the exact frequency response of the arm; or as a script of python-control.
@@ -26,7 +27,7 @@ from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices, StateSpace
 from tfarm.arm.law import REFERENCE, Part
 from tfarm.arm.stages import Consumer
-from tfarm.arrays import Complex
+from tfarm.arrays import Complex, Real
 from tfarm.case import Case
 from tfarm.dsp.discretise import acting_law, with_estimate
 from tfarm.dsp.plant import USUAL_MODES, arm_under_chain
@@ -47,10 +48,10 @@ from tfarm.response.signals import Signals
 
 CONSUMER = Consumer(
     "export mat, py",
-    acts=("anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
+    acts=("anti-alias filter", "hub rate", "shaper", "law", "hold", "delay", "hub damping", "plant"),
     named=("encoder", "amplifier steps", "amplifier range", "DAC steps", "DAC range", "torque limit"),
     partly=("arithmetic",),
-    none=("reference", "shaper", "volts"),
+    none=("reference", "volts"),
 )
 
 
@@ -139,6 +140,17 @@ def loop_system(plant: NamedSystem, controller: NamedSystem) -> NamedSystem:
     )
 
 
+def shaper_system(impulses: Real, period: float) -> dict[str, NamedSystem]:
+    """Return the shaper of a reference or feedforward by its name, with a state a sample; none of a single impulse."""
+    first, *others = impulses.tolist()
+    n = len(others)
+    if n == 0:
+        return {}
+    matrices = np.eye(n, k=-1), np.eye(n, 1), np.array([others]), np.array([[first]])
+    states = tuple(f"sample{k + 1}" for k in range(n))
+    return {"shaper": NamedSystem("shaper", matrices, ("reference",), ("shaped_reference",), states, period)}
+
+
 # ------------------------------------------------------------ the arm itself
 
 
@@ -215,13 +227,14 @@ def linear(task: ExportTask) -> Linear:
         verdict = judged.verdict.sentence
     head = [f"{label}: {value}" for label, value in facts.items()]
     controller = controller_system(case)
+    shaper = {} if what == "plant" else shaper_system(task.impulses, case.chain.sampling.period)
     if what == "controller":
-        return Linear({what: controller}, head, {}, verdict)
+        return Linear({what: controller, **shaper}, head, {}, verdict)
     plant = plant_system(case)
     read = Signals(arm_under_chain(case.arm, case.chain)[0], plant.outputs)
     systems = {"plant": plant, **reduced_systems(read.arm, read.names)}
     if what == "loop":
-        systems = {what: loop_system(plant, controller), "controller": controller, **systems}
+        systems = {what: loop_system(plant, controller), "controller": controller, **systems, **shaper}
     return Linear(
         systems, head, response_data(read.arm, case.arm.input, read.names, BAND, read.values), verdict
     )

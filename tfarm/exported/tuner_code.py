@@ -59,7 +59,7 @@ CONSUMER = Consumer(
         "torque limit",
         "arithmetic",
     ),
-    none=("reference", "shaper", "volts"),
+    none=("reference", "volts"),
 )
 
 # exact, and of either precision with another number

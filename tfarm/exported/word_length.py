@@ -10,6 +10,10 @@ coefficients has one shift f, so that the sum of all products is below 2^63 and 
 Bounds are sums of absolute values of responses over all samples, the l1 norm (Dahleh and Diaz-Bobillo, Control of
 Uncertain Systems, 1995).  Where the law itself is not stable, as with an integral, they are over `MOST_SUMMED` samples.
 A DAC adds half of its step to the rounding of u.  Limits of u keep every bound, as clipping separates no two numbers.
+
+A shaper makes r_k = c_1 r'_{k-l_1} + c_2 r'_{k-l_2} + ... of references and feedforward r' within R: r is within gain
+times R, and its rounding within error times R.  In fixed point the sizes c are whole numbers over a power of 2, their
+sum.
 """
 
 import math
@@ -22,7 +26,7 @@ import numpy as np
 
 from tfarm.arm import Law
 from tfarm.arm.law import REFERENCE
-from tfarm.arrays import Real
+from tfarm.arrays import Real, Whole
 from tfarm.dsp.discretise import system_matrix
 from tfarm.errors import ParameterError, require
 from tfarm.exported.realisations import close_around_law, with_system_matrix
@@ -52,6 +56,39 @@ class WordLengthBounds(NamedTuple):
     is_whole: bool
     error: float
     output: float
+
+
+class ShaperCode(NamedTuple):
+    """Impulses that are not 0: samples ago, sizes as exported, their `shift` in fixed point; gain and error of r.
+
+    Without any nothing is shaped.
+    """
+
+    lags: Whole
+    sizes: Any
+    shift: int
+    gain: float
+    error: float
+
+
+def shaper_code(impulses: Real, precision: str) -> ShaperCode:
+    """Return impulses (m,) in the numbers of a target; a single one is left out."""
+    if impulses.size == 1:
+        return ShaperCode(np.zeros(0, int), np.zeros(0, int if precision == FIXED else float), 0, 1.0, 0.0)
+    lags = np.flatnonzero(impulses)
+    sizes = impulses[lags]
+    # all together are 1
+    gain = 1.0 + 2.0 * float(abs(sizes[sizes < 0]).sum())
+    if precision != FIXED:
+        kind, unit = FLOATS[precision]
+        # of a size, of its product, and of the sums
+        terms = lags.size + 3
+        error = terms * unit / (1 - terms * unit) * gain
+        return ShaperCode(lags, sizes.astype(kind).astype(float), 0, gain, error)
+    shift = 30 - math.ceil(math.log2(gain))
+    whole = np.rint(np.ldexp(sizes, shift)).astype(np.int64)
+    whole[abs(whole).argmax()] += 2**shift - whole.sum()
+    return ShaperCode(lags, whole, shift, gain, HALF_STEP + math.ldexp(float(lags.size), -shift))
 
 
 def absolute_sum(M: Real, left: Real, right: Real, most: int = MOST_SUMMED) -> tuple[Real, bool]:
@@ -85,9 +122,10 @@ def absolute_sum(M: Real, left: Real, right: Real, most: int = MOST_SUMMED) -> t
 class Word:
     """A realised law in z of one state space, in the numbers of a target.
 
-    `sizes` bounds e of each column, and `slips` the error of an estimate in it; `feedforward` bounds r, and `step` is
-    that of the DAC.  In fixed point `ranges` are the scales of e, that of each state is 1, and `output` is that of u.
-    `table` is [A B; C D] as exported, whole numbers in fixed point, and `shifts` those of its rows.
+    `sizes` bounds e of each column, and `slips` the error of an estimate or a shaper in it; `feedforward` bounds r and
+    its error, and `step` is that of the DAC.  In fixed point `ranges` are the scales of e, that of each state is 1, and
+    `output` is that of u.  `table` is [A B; C D] as exported, whole numbers in fixed point, and `shifts` those of its
+    rows.
     """
 
     law: Law
@@ -95,7 +133,7 @@ class Word:
     sizes: Real
     ranges: Real
     output: float
-    feedforward: float
+    feedforward: tuple[float, float]
     step: float
     slips: Real
     table: Any
@@ -151,7 +189,7 @@ class Word:
             return WordLengthBounds(np.full(n, np.inf), False, math.inf, math.inf)
         S, X = np.hsplit(sums * (1 + lost), [n])
         largest = X @ self.sizes
-        output = float(largest[n] + abs(exact[n, n:]) @ self.sizes + self.feedforward)
+        output = float(largest[n] + abs(exact[n, n:]) @ self.sizes + self.feedforward[0])
         # the sum itself is rounded
         output *= 1 + (n + self.sizes.size + 3) * unit
         rest = V[:, n:] @ self.sizes + abs(rounded[:, n:]) @ self.slips + absolute
@@ -161,7 +199,8 @@ class Word:
         if not np.isfinite(states).all():
             return WordLengthBounds(states, is_whole, math.inf, output)
         w = V[:, :n] @ states + rest
-        error = S[n] @ w[:n] + w[n] + relative * self.feedforward
+        forward, slip = self.feedforward
+        error = S[n] @ w[:n] + w[n] + relative * forward + (1 + relative) * slip
         return WordLengthBounds(states, is_whole, float(error), output)
 
     def limit_cycle(self, loop: Sampled) -> float | None:
@@ -230,12 +269,13 @@ def word_of(
     ranges: Mapping[str, float],
     step: float = 0.0,
     hub: tuple[float, float] | None = None,
+    shaper: ShaperCode | None = None,
 ) -> Word:
     """Return a realised law in the numbers of a target.
 
     `ranges` are the largest absolute values of its inputs and of u in SI units, `step` is that of the DAC, `hub` pole
-    and period [s] of an estimated hub rate.  Raises ParameterError, in fixed point for a signal or an output without a
-    range, and for a coefficient that is beyond the numbers of the target.
+    and period [s] of an estimated hub rate, `shaper` that of references and feedforward.  Raises ParameterError, in
+    fixed point for a signal or an output without a range, and for a coefficient beyond the numbers of the target.
     """
     names = [name.removeprefix(REFERENCE) for name in (*law.signals, *law.wanted)]
     for name in (*names, OUTPUT):
@@ -254,8 +294,14 @@ def word_of(
         # of its operations, and of the pole
         of_double = (6 + 2 / (1 - pole)) * FLOATS["double"][1] / (1 - pole)
         slips[at] = E[at] * (FLOATS[precision][1] + of_double)
-    E += R * np.array([name in law.references for name in (*law.signals, *law.wanted)])
-    word = Word(law, precision, E, R, U, ranges.get(FEEDFORWARD, U), step, slips, system_matrix(law))
+    shaper = shaper or shaper_code(np.ones(1), precision)
+    is_column = np.repeat([False, True], [len(law.signals), len(law.wanted)])
+    wanted = R * (is_column | [name in law.references for name in (*law.signals, *law.wanted)])
+    E += shaper.gain * wanted - R * is_column
+    slips += shaper.error * wanted
+    forward = ranges.get(FEEDFORWARD, U)
+    feedforward = (shaper.gain * forward, shaper.error * forward)
+    word = Word(law, precision, E, R, U, feedforward, step, slips, system_matrix(law))
     if precision == FIXED:
         return to_fixed_point(word)
     kind = FLOATS[precision][0]
@@ -288,7 +334,7 @@ def to_fixed_point(word: Word) -> Word:
     R = word.ranges
     U = word.output
     remedy = f"in fixed point feedforward is a fraction of the range of the output: at most {U!r}"
-    require(word.feedforward <= U, "range.feedforward", word.feedforward, remedy)
+    require(word.feedforward[0] <= U, "range.feedforward", word.feedforward[0], remedy)
     S = word.table
     n = word.law.order
     one = np.ones(n)

@@ -414,7 +414,8 @@ class _DesignTask:
             for score, x in found.found:
                 law = found.form.record_at(x)
                 if effort == "sketch" or (
-                    score < least_lost and all(judge.is_stable(law) for judge in several)
+                    score < least_lost
+                    and all(judge.is_stable(law) and judge.is_confirmed(law, score) for judge in several)
                 ):
                     return _Choice(Worst(several), found, score, x, law)
         score, x = nearest

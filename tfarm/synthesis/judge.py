@@ -169,7 +169,7 @@ class Objective(NamedTuple):
 class Judge:
     """The objective of laws on an arm, by a `model` of few modes; the models `also` have to be stable, too.
 
-    Slews are those of the arm `known`.
+    Slews are those of the arm `known`, by its model `nominal` where that is another arm.
     """
 
     arm: Arm
@@ -179,6 +179,7 @@ class Judge:
     model: DesignModel
     also: tuple[DesignModel, ...]
     delayed: tuple[DesignModel, ...] = ()
+    nominal: DesignModel | None = None
 
     @property
     def is_sampled(self) -> bool:
@@ -188,7 +189,7 @@ class Judge:
     @cached_property
     def slews(self) -> Slews:
         """The slews of the model."""
-        return Slews(self.model, self.arm, self.known, self.chain)
+        return Slews(self.model, self.arm, self.known, self.chain, self.nominal or self.model)
 
     @cached_property
     def conditions(self) -> list[tuple[DesignModel, float]]:
@@ -279,8 +280,14 @@ class Judge:
         if not self.is_sampled:
             return self.score(law)
         case = self.case(law)
-        run, _ = simulate_modes(case, slew_and_after(case.arm, self.known, case.chain))
+        run, _ = simulate_modes(case, slew_and_after(case.arm, self.known, case.chain, law))
         return np.inf if run.residual_moment is None else run.residual_moment
+
+    def is_confirmed(self, law: AnyLaw, score: float) -> bool:
+        """Return whether the residual of a shaped slew is as simulated: impulses jump where a mode gets overdamped."""
+        if self.chain.reference.shaper == "none" or not self.objective.of_slew:
+            return True
+        return self.value(law) <= self.objective.within_one_per_cent(score)
 
     def is_stable(self, law: AnyLaw) -> bool:
         """Return whether the loop is stable by the exact verdicts, when sampled also with a reserve."""
@@ -367,6 +374,9 @@ def judge_of(
     aim = OBJECTIVES[objective] if isinstance(objective, str) else objective
     if aim.of_slew and "root_moment" not in signals:
         signals = (*signals, "root_moment")
+    nominal = None
+    if aim.of_slew and known != arm and chain.reference.shaper != "none" and not continuous:
+        nominal = judge_of(known, known, chain, objective, signals, modes, count).model
     known, _ = arm_under_chain(known, chain)
     arm, chain = arm_under_chain(arm, chain)
     speed = 2 / chain.sampling.period
@@ -374,7 +384,8 @@ def judge_of(
         model = continuous_model(arm, signals, modes, 2 * count, speed)
         return Judge(arm, known, chain, aim, model, ())
     model = sampled_model(arm, chain, signals, modes, count)
-    return Judge(arm, known, chain, aim, model, (continuous_model(arm, signals, modes, count, speed),))
+    also = (continuous_model(arm, signals, modes, count, speed),)
+    return Judge(arm, known, chain, aim, model, also, nominal=nominal)
 
 
 def lost(stage: int, growth: Real) -> Real:

@@ -20,14 +20,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
-from tfarm.arm import Arm
+from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.blocks import Matrices
 from tfarm.arm.weights import Weights
 from tfarm.arrays import LEAST_SIZE, Complex, Real
-from tfarm.dsp import Chain, Scenario, scenario
+from tfarm.dsp import Chain, Scenario
 from tfarm.dsp.pulse import PulseTransfer
-from tfarm.dsp.scenarios import TRIAL_SLEWS, trial_weights
+from tfarm.dsp.scenarios import TRIAL_SLEWS, slew_scenario, trial_weights
 from tfarm.dsp.sensed import sensed_plant
+from tfarm.dsp.shaping import SHARES, impulses_at, impulses_of, modes_alone, modes_under
 from tfarm.errors import require
 from tfarm.loop.continuous import frequency_above_mode, grid
 from tfarm.records import frozen
@@ -44,8 +45,9 @@ class DesignModel:
     `speed` [1/s] is c, the unit of a law's s.  `grid` gives angles (m,) of the circle [rad] or frequencies [rad/s], and
     `response` the signals (signals, k) at k of them.  The damping of poles counts below `band` [rad/s], without one
     each near the poles of open-loop modes `higher`, the highest first.  `last` is the state with the input of the last
-    sample; `own_moment` (n,) is the row of the arm's own root moment, before the anti-alias filter.  A `rate` is the
-    filtered difference of the angle, which it is a factor of; `weights` are those of a norm.
+    sample; `own_moment` (n,) is the row of the arm's own root moment, before the anti-alias filter.  `alone` are the
+    poles of the modes of the sampled arm without a law, by their numbers.  A `rate` is the filtered difference of the
+    angle, which it is a factor of; `weights` are those of a norm.
     """
 
     plant: Matrices
@@ -58,6 +60,7 @@ class DesignModel:
     higher: tuple[complex, ...]
     last: int
     own_moment: Real
+    alone: dict[int, complex]
     rate: Callable[[Complex], Complex] | None = None
     weights: Weights | None = None
 
@@ -191,6 +194,7 @@ def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int,
         (),
         0,
         moment,
+        {},
     )
 
 
@@ -252,6 +256,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         tuple(complex(each.real, abs(each.imag)) for each in higher),
         first + 2 - missing,
         np.delete(own, gone),
+        modes_alone(pulse),
         rate,
     )
 
@@ -326,9 +331,15 @@ def in_blocks(signals: Real, first: int) -> Blocks:
 
 
 def squares(A: Real, B: Real, C: Real, D: Real, signals: Blocks) -> Real:
-    """Return the sum of squares (laws,) of C x_k + D r_k over the counted samples, x_{k+1} = A x_k + B r_k from x = 0.
+    """Return the sum of squares (laws,) of the outputs over the counted samples."""
+    return np.asarray((block_outputs(A, B, C, D, signals) ** 2).sum(axis=(1, 2)))
 
-    The outputs of a block are one product with its first state and the shares of its signals.
+
+def block_outputs(A: Real, B: Real, C: Real, D: Real, signals: Blocks) -> Real:
+    """Return C x_k + D r_k over the counted samples, x_{k+1} = A x_k + B r_k from x = 0: (laws, size outputs, blocks).
+
+    A row is a sample of its block and an output; those beyond the last sample are 0.  The outputs of a block are one
+    product with its first state and the shares of its signals.
     """
     laws, _, inputs = B.shape
     seen = C.shape[1]
@@ -358,29 +369,52 @@ def squares(A: Real, B: Real, C: Real, D: Real, signals: Blocks) -> Real:
     x = np.concatenate([np.moveaxis(x[..., 0], 0, 2), shares], axis=1)
     outputs = together @ x[:, :, signals.first :]
     outputs[:, signals.tail * seen :, -1] = 0.0
-    return (outputs**2).sum(axis=(1, 2))
+    return outputs
 
 
-def slew_and_after(arm: Arm, known: Arm, chain: Chain) -> Scenario:
-    """Return the slew for the arm `known`, and a period of the first mode of the moving arm."""
+def shaped_outputs(outputs: Real, signals: Blocks, impulses: Sequence[Real]) -> Real:
+    """Return the outputs (laws, outputs, samples) of `block_outputs` through the impulses of each law."""
+    laws, rows, blocks = outputs.shape
+    size = signals.basis.shape[1]
+    in_time = outputs.reshape(laws, size, rows // size, blocks).transpose(0, 2, 3, 1)
+    in_time = in_time.reshape(laws, rows // size, -1)[..., : signals.counted]
+    for several, own in zip(in_time, impulses, strict=True):
+        for y in several:
+            y[:] = np.convolve(y, own)[: y.size]
+    return in_time
+
+
+def slew_and_after(
+    arm: Arm, known: Arm, chain: Chain, law: AnyLaw | None = None, added: float = 0.0
+) -> Scenario:
+    """Return the slew for the arm `known`, through its shaper for a `law`, and a period of the moving arm's first mode.
+
+    The record is longer by the shaper, and by the time `added` [s].
+    """
     # where a period of the first mode has fewer samples
     left = max(2 * np.pi / first_frequency(arm), 16 * chain.sampling.period)
-    return scenario("slew", known, chain, chain.slew.rise_time + left)
+    impulses = np.ones(1) if law is None else impulses_of(known, chain, law)
+    later = added + (impulses.size - 1) * chain.sampling.period
+    return slew_scenario(known, chain, chain.slew.rise_time + left + later).through(impulses)
 
 
 def trial_slew(known: Arm, chain: Chain) -> Scenario:
-    """Return the slew of the tuner's trials for the arm `known`."""
-    return scenario("slew", known, chain, TRIAL_SLEWS * chain.slew.rise_time)
+    """Return the slew of the tuner's trials for the arm `known`, without a shaper."""
+    return slew_scenario(known, chain, TRIAL_SLEWS * chain.slew.rise_time)
 
 
 @frozen
 class Slews:
-    """Slews of an arm in a model, with references of the arm `known`."""
+    """Slews of an arm in a model, with references of the arm `known`, whose model is `nominal`.
+
+    A shaper acts as one of the outputs: what is linear and at rest before has them in any order.
+    """
 
     model: DesignModel
     arm: Arm
     known: Arm
     chain: Chain
+    nominal: DesignModel
 
     def residual(self, entries: Sequence[Entry]) -> Real:
         """Return the root mean square [N m] of the arm's own moment less the rigid arm's (laws,)."""
@@ -388,7 +422,16 @@ class Slews:
             return np.sqrt(self._mean_square_in_time(entries))
         A, B, C, D = self._closed_loop(entries, 1)
         D[:, 0, -1] -= 1.0
-        return np.sqrt(squares(A, B, C, D, self._after) / self._after.counted)
+        if self.chain.reference.shaper == "none":
+            return np.sqrt(squares(A, B, C, D, self._after) / self._after.counted)
+        impulses = self._impulses(entries)
+        added = max(each.size - 1 for each in impulses)
+        signals = self._signals_after(added * self.chain.sampling.period)
+        # over equally long records from the end of each slew on
+        number = signals.counted - added
+        outputs = shaped_outputs(block_outputs(A, B, C, D, signals), signals, impulses)
+        late = (y[each.size - 1 :][:number] for y, each in zip(outputs[:, 0], impulses, strict=True))
+        return np.array([np.sqrt(np.mean(each**2)) for each in late])
 
     def cost(self, entries: Sequence[Entry]) -> Real:
         """Return T sum of (a x^2 + b e^2)/2 (laws,)."""
@@ -403,12 +446,34 @@ class Slews:
         D[:, (0, 1), (-2, -1)] = -1.0
         T = self.chain.sampling.period
         weights = np.sqrt(np.array(trial_weights(self.known, self.chain)) * T / 2)[:, None]
-        return squares(A, B, weights * C, weights * D, self._trial)
+        matrices = (A, B, weights * C, weights * D)
+        if self.chain.reference.shaper == "none":
+            return squares(*matrices, self._trial)
+        outputs = shaped_outputs(block_outputs(*matrices, self._trial), self._trial, self._impulses(entries))
+        return np.asarray((outputs**2).sum(axis=(1, 2)))
+
+    def _impulses(self, entries: Sequence[Entry]) -> list[Real]:
+        """Return the impulses of the shaper under each law; nan for an unstable loop."""
+        nominal = self.nominal
+        law = nominal.states(entries)
+        reference = self.chain.reference
+        # fewer than of a law that is exported: a search has thousands
+        matrices = np.stack([nominal.closed_matrices(law, share) for share in SHARES.tolist()], axis=1)
+        found = [np.full(1, np.nan)] * len(matrices)
+        is_stable = nominal.growth(nominal.poles(entries)).max(axis=1) < 0
+        for n in np.flatnonzero(is_stable).tolist():
+            poles = modes_under(matrices[n], nominal.alone)
+            found[n] = impulses_at(poles, reference.shaper, reference.modes)
+        return found
 
     @cached_property
     def _after(self) -> Blocks:
-        """The signals of a residual, and the moment of the rigid arm."""
-        task = slew_and_after(self.arm, self.known, self.chain)
+        """The signals of a residual without a shaper."""
+        return self._signals_after(0.0)
+
+    def _signals_after(self, added: float) -> Blocks:
+        """Return the signals of a residual, and the rigid arm's moment, of a record longer by `added` [s]."""
+        task = slew_and_after(self.arm, self.known, self.chain, added=added)
         return in_blocks(self._signals(task, task.rigid_moment), int(task.is_after.argmax()))
 
     @cached_property

@@ -213,7 +213,7 @@ class Design:
         if self.loop == "continuous":
             return None
         if self.objective == "residual":
-            return float(slew_and_after(arm, arm, self.chain).t[-1])
+            return float(slew_and_after(arm, arm, self.chain, self.law).t[-1])
         if self.objective == "cost":
             return float(trial_slew(arm, self.chain).t[-1])
         return None

@@ -29,7 +29,7 @@ from tfarm.arm import MOMENT_GAIN, Arm
 from tfarm.arrays import Real
 from tfarm.case import Case
 from tfarm.dsp import Chain, Converters, Simulation
-from tfarm.dsp.scenarios import torque_unit
+from tfarm.dsp.scenarios import slew_scenario, torque_unit
 from tfarm.dsp.shaping import impulses_at, loop_modes
 from tfarm.errors import ConvergenceError
 from tfarm.loop.sampled import Sampled
@@ -122,9 +122,12 @@ def shaped_trial(trial: Trial, kind: Shaper) -> Trial:
     """Return the trial with its slew shaped.
 
     x is then the moment less the rigid arm's under the shaped slew, which arrives later.  The linear-quadratic bound of
-    the unshaped slew is no bound of it.
+    the unshaped slew is no bound of it.  The shaper of a chain is replaced.
     """
-    return replace(trial, task=trial.task.through(shaper(trial.loop, kind)))
+    task = trial.task
+    if trial.loop.chain.reference.shaper != "none":
+        task = slew_scenario(trial.arm, trial.loop.chain, float(task.t[-1]))
+    return replace(trial, task=task.through(shaper(trial.loop, kind)))
 
 
 class Outcome(NamedTuple):

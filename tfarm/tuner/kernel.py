@@ -28,7 +28,17 @@ from tfarm.records import frozen
 
 CONSUMER = Consumer(
     "tune",
-    acts=("reference", "anti-alias filter", "hub rate", "law", "hold", "delay", "hub damping", "plant"),
+    acts=(
+        "reference",
+        "shaper",
+        "anti-alias filter",
+        "hub rate",
+        "law",
+        "hold",
+        "delay",
+        "hub damping",
+        "plant",
+    ),
     partly=(
         "encoder",
         "amplifier steps",

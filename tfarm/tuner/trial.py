@@ -29,7 +29,7 @@ from typing import Annotated, Literal, get_args
 import numpy as np
 from pydantic import Field
 
-from tfarm.arm import FED_BACK, Arm, HubFeedback, must_not_be_algebraic
+from tfarm.arm import FED_BACK, MOMENT_GAIN, Arm, HubFeedback, must_not_be_algebraic
 from tfarm.arm.chain import MomentReading
 from tfarm.arm.checks import check_annotated, not_negative, positive
 from tfarm.arm.schema import StrictTable, validated_file
@@ -203,7 +203,7 @@ def slew_trial(
     duration: float = TRIAL_DURATION,
     count: int = TRIAL_MODES,
 ) -> Trial:
-    """Return the slew of an arm with `count` flexible modes.
+    """Return the slew of an arm with `count` flexible modes; a shaper is for the poles without moment feedback.
 
     `K1` is by default that of `default_gains`, or with a `Kp` that of `usual_rate_gain`.  Raises ParameterError for an
     arm that cannot turn, a hub without inertia, and numbers out of range.
@@ -214,11 +214,12 @@ def slew_trial(
     gains = HubFeedback(K1=usual_rate_gain(arm, Kp) if K1 is None else K1, K2=1.0, Kp=Kp)
     length = positive("duration", duration, "a trial lasts a positive number of seconds")
     chain = with_signals(chain, signals)
-    rise = chain.slew.rise_time
-    require(length >= rise, "duration", length, f"a trial lasts at least as long as its slew, {rise:g} s")
     must_not_be_algebraic(arm, "hub.inertia", 0.0)
+    task = scenario("slew", arm, chain, length, gains.having(MOMENT_GAIN, 0.0))
+    end = task.busy_until
+    require(length >= end, "duration", length, f"a trial lasts at least as long as its slew, {end:g} s")
     loop = sampled_loop(Case(arm, gains, chain), count=count)
-    return Trial(loop, scenario("slew", arm, chain, length), Cost() if cost is None else cost, signals)
+    return Trial(loop, task, Cost() if cost is None else cost, signals)
 
 
 def usual_rate_gain(arm: Arm, Kp: float) -> float:

@@ -306,12 +306,13 @@ class TuningResult:
         """The costs with the tuner and with the baselines."""
         tuning = self.tuning
         best = tuning.best_constant
+        is_plain = tuning.trial.loop.chain.reference.shaper == "none"
         return [
             Baseline("no moment feedback", tuning.without.cost),
             Baseline(f"best constant gain, K = {best.gain:.4g}", best.cost),
             Baseline(f"tuner, after {self.trials} trials", tuning.training.result.cost),
             *tuning.shaped.values(),
-            Baseline("linear-quadratic bound of the unshaped slew", tuning.bound.cost),
+            Baseline(f"linear-quadratic bound of the {'unshaped ' * is_plain}slew", tuning.bound.cost),
         ]
 
     @property
@@ -412,7 +413,7 @@ def simulate_tuner(
     chain = with_signals(chain, saved.signals)
     gain = saved.gain()
     case = Case(arm, gain.servo, chain)
-    task = scenario(name, arm, chain, duration)
+    task = scenario(name, arm, chain, duration, gain.servo)
     run, used = simulate_modes(case, task, count, between, outputs, gain.run)
     trained = {
         "trained_on": saved.arm,

@@ -11,6 +11,11 @@ static const {{ real }} ABCD[{{ n + 1 }}][{{ n + m }}] = { /* of [x; e], to the 
 static const {{ real }} BACK[{{ n }}] = { {{- back[2:]|join(", ") -}} }; /* back-calculation from a clipped output */
 
 {% endif %}
+{% if shaped %}
+static const int LAGS[{{ lags|length }}] = { {{- lags|join(", ") -}} }; /* of the impulses of the shaper, in samples */
+static const {{ real }} SIZES[{{ lags|length }}] = { {{- impulses|join(", ") -}} };{{ " /* over 2^%d */"|format(shift) if fixed }}
+
+{% endif %}
 {% if fixed %}
 static const unsigned int shifts[{{ n + 1 }}] = { {{- shifts|join("U, ") -}} U};
 
@@ -74,7 +79,7 @@ int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ n
 {
     int i, j, status = 0;
     {{ wide }} z[{{ n + m }}], next[{{ n + 1 }}], total;
-{{ "    double rate;\n" if hub }}
+{{ "    double rate;\n" if hub }}{{ "    %s r[%d];\n"|format(wide, shaped|length) if shaped }}
 {% if not fixed %}
     *output = state->output;
     if ({% for field in fields %}(is_finite(input->{{ field.identifier }}) == 0){{ ") {" if loop.last else " || " }}{% endfor %}
@@ -85,6 +90,20 @@ int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ n
 {% if hub %}
     rate = (state->begun != 0) ? ((double)input->{{ hub[0] }} - state->angle) : 0.0;
     rate = ({{ hub[1] }} * state->rate) + (((1.0 - {{ hub[1] }}) * rate) / {{ hub[2] }});
+{% endif %}
+{% if shaped %}
+{% for field in shaped %}
+    state->ring[state->place][{{ loop.index0 }}] = input->{{ field.identifier }};
+{% endfor %}
+    for (i = 0; i < {{ shaped|length }}; i++) {
+        r[i] = 0{{ ".0" + suffix if not fixed }};
+        for (j = 0; j < {{ lags|length }}; j++) {
+            r[i] += {{ cast }}SIZES[j] * state->ring[((state->place + {{ length }}) - LAGS[j]) % {{ length }}][i];
+        }
+{% if fixed %}
+        r[i] = shifted(r[i], {{ shift }}U);
+{% endif %}
+    }
 {% endif %}
 {% if n %}
     for (j = 0; j < {{ n }}; j++) {
@@ -97,7 +116,7 @@ int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ n
     for (i = 0; i < {{ n + 1 }}; i++) {
         total = 0{{ ".0" + suffix if not fixed }};
         if (i == {{ n }}) {
-            total = {{ "(int64_t)input->feedforward * INT64_C(%d)"|format(2**shifts[-1]) if fixed else "input->feedforward" }};
+            total = {{ feedforward }}{{ " * INT64_C(%d)"|format(2**shifts[-1]) if fixed }};
         }
         for (j = 0; j < {{ n + m }}; j++) {
             total += {{ cast }}ABCD[i][j] * z[j];
@@ -148,6 +167,9 @@ int {{ name }}_step({{ name }}_state *state, const {{ name }}_input *input, {{ n
     state->angle = (double)input->{{ hub[0] }};
     state->rate = rate;
     state->begun = 1;
+{% endif %}
+{% if shaped %}
+    state->place = (state->place + 1) % {{ length }};
 {% endif %}
     *output = state->output;
     return status;

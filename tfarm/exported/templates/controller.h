@@ -59,6 +59,7 @@ typedef struct {
 {% block state %}
 {{ "    %s_number x[%d];\n"|format(name, n) if n -}}
 {{ "    %s_number line[%d]; /* delay of the controller */\n"|format(name, delay) if delay -}}
+{{ "    %s_number ring[%d][%d]; /* references and feedforward, for the shaper */\n    int place;\n"|format(name, length, shaped|length) if shaped -}}
 {{ "    double angle, rate; /* estimate of the hub rate */\n    int begun;\n" if hub -}}
 {% endblock %}
     {{ name }}_number output;
