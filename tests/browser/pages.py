@@ -37,7 +37,7 @@ from tfarm.loop.stability import stability
 from tfarm.report.live import ASSETS, SCRIPT, LivePage, save_live, write_assets
 from tfarm.report.page import ArmReport, GivenLaw
 from tfarm.schema import to_dict
-from tfarm.synthesis.stability_map import recommended_gains
+from tfarm.synthesis.design import recommended_gains
 
 Real = NDArray[np.float64]
 
@@ -541,7 +541,7 @@ def test_what_the_requirements_forbid_is_shaded_and_the_recommended_gains_are_go
         page = opened.page
         page.click("#recommend")
         page.wait_for_function("() => live.rested === live.now.law")
-        chosen = recommended_gains(tfarm.load(ARMS[0]), load_chain(ARMS[0])).law
+        chosen = recommended_gains(tfarm.load(ARMS[0]), load_chain(ARMS[0]))[0].law
         assert page.evaluate("live.law") == chosen.by_name
         for grade in ("s-phase", "s-delay", "s-peak", "z-phase", "z-delay", "z-peak"):
             assert page.inner_text(f"#{grade}-grade") == "good"

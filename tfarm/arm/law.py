@@ -369,11 +369,16 @@ def as_law(law: AnyLaw) -> Law:
 
 
 def of_common_blocks(law: Law) -> Law:
-    """Return the law with ratios of the same denominator as one block: apart, each adds poles that no signal shows."""
+    """Return the law with ratios of the same denominator as one block: apart, each adds poles that no signal shows.
+
+    Poles at 0 may be those of one of the ratios: the integrator of one signal.
+    """
     alike: dict[object, list[Part]] = {}
     for part in law.parts:
-        is_shared = part.block.order and part.block.excess <= 0
-        key = getattr(part.block, "den", id(part)) if is_shared else id(part)
+        block = part.block
+        key: object = id(part)
+        if isinstance(block, Rational) and block.order and block.excess <= 0:
+            key = tuple(np.trim_zeros(block.den, "b"))
         alike.setdefault(key, []).append(part)
     return replace(law, parts=tuple(map(_merge, alike.values())))
 
@@ -382,7 +387,13 @@ def _merge(parts: Sequence[Part]) -> Part:
     """Return ratios of the same denominator as one block, in observable form: the transpose of each one's states."""
     if len(parts) == 1:
         return parts[0]
-    A, B, C, D = zip(*(part.block.matrices() for part in parts), strict=True)
+    order = max(part.block.order for part in parts)
+    blocks = []
+    for part in parts:
+        assert isinstance(part.block, Rational)
+        poles_at_origin = (0.0,) * (order - part.block.order)
+        blocks.append(Rational(part.block.num + poles_at_origin, part.block.den + poles_at_origin))
+    A, B, C, D = zip(*(block.matrices() for block in blocks), strict=True)
     signals = tuple(chain.from_iterable(part.signals for part in parts))
     return Part(signals, StateSpace(A[0].T, np.vstack(C).T, B[0].T, np.hstack(D)))
 

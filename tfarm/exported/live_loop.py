@@ -46,6 +46,7 @@ from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
 from tfarm.response import transfer
 from tfarm.spectrum.gains import angle_unit, default_gains
+from tfarm.synthesis.design import recommended_gains
 from tfarm.synthesis.good_region import GoodRegion, good_region
 from tfarm.synthesis.stability_map import BEYOND_PICTURE, sampled_region
 
@@ -109,6 +110,7 @@ def _of_gains(case: Case, start: HubFeedback) -> LiveNumbers:
     continuous = gain_map(arm, across, np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE]))
     sampled = sampled_region(arm, x, y, case.chain)
     good = good_region(arm, x, y, case.chain)
+    chosen, _ = recommended_gains(arm, case.chain)
     return {
         **_of_any_law(case.under(reference), corners),
         "names": NAMES,
@@ -124,19 +126,13 @@ def _of_gains(case: Case, start: HubFeedback) -> LiveNumbers:
         "continuous": _areas(continuous),
         "sampled_map": None if sampled is None else _sampled_map(sampled),
         "good": None if good is None else _areas(good),
-        "recommended": None if good is None else _recommended(good),
+        "recommended": chosen.law.by_name if chosen is not None and chosen.is_met else None,
         "sampled_loop": None if sampled is None else sampled_numbers(sampled.loop),
         "slew": slew_numbers(case),
         "lyapunov": arm.is_uniform,
         "default": reference.by_name,
         "outputs": OUTPUT_OF,
     }
-
-
-def _recommended(good: GoodRegion) -> dict[str, float] | None:
-    """Return the gains recommended, if they meet the requirements of the grade good."""
-    found = good.recommended
-    return found.law.by_name if found.is_met else None
 
 
 def _range(axis: Axis) -> LiveNumbers:

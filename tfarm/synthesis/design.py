@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from itertools import islice
 from operator import attrgetter, itemgetter
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ from tfarm.dsp.plant import arm_under_chain
 from tfarm.dsp.profiles import motion_of_slew
 from tfarm.dsp.simulate import quantisers
 from tfarm.dsp.stages import admit
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, ParameterError, TfarmError
 from tfarm.errors import require as require_that
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.norms import weight_sizes
@@ -33,6 +33,7 @@ from tfarm.loop.stability import stability
 from tfarm.records import frozen
 from tfarm.synthesis.drawn import AnyStudy, drawn_arms, verify, violation_on
 from tfarm.synthesis.goals import norm_bound
+from tfarm.synthesis.good_region import map_region
 from tfarm.synthesis.judge import LOST, OBJECTIVES, TOO_SLOW, Judge, judge_of, model_sizes
 from tfarm.synthesis.required import RequiredLaw, RequirementTask, why_none
 from tfarm.synthesis.requirements import (
@@ -45,7 +46,6 @@ from tfarm.synthesis.requirements import (
 )
 from tfarm.synthesis.result import Design, OnArm
 from tfarm.synthesis.search import Search, Worst, flat_part, search
-from tfarm.synthesis.stability_map import recommended_gains
 from tfarm.synthesis.structures import STRUCTURES, Bounds, Structure, check_bounds, structure_of
 from tfarm.synthesis.trade_off import TradeOff, front
 from tfarm.synthesis.worst_case import (
@@ -179,7 +179,7 @@ def design(
         drawn = drawn_arms(arm, study, posterior, fresh)
         worst = partial(violation_on, search_for)
     found, named, case = for_the_worst(
-        arms, box or drawn, partial(_find_or_good_gains, search_for), worst, options.tell
+        arms, box or drawn, partial(_find_near_map, search_for), worst, options.tell
     )
     conflicts: tuple[str, ...] = ()
     alternatives: tuple[str, ...] = ()
@@ -197,34 +197,50 @@ def design(
     return replace(options, weights=search_for.weights).with_norm(record)
 
 
-def _find_or_good_gains(
+def _find_near_map(
     task: RequirementTask, named: Sequence[NamedArm], before: RequiredLaw | None, effort: Effort
 ) -> RequiredLaw:
-    """Return the law of a search, or of the region of good gains in the map, where that has less violation.
+    """Return the law of a search that begins at the region of the requirements in the map of both gains.
 
-    That region may be a sliver, between whose points a search finds none.
+    That region may be a sliver, between whose points a search finds none.  The fastest gains of its grid are near the
+    best: of one arm a short search follows.
     """
+    form = task.form
+    is_free = form.name == TWO_GAINS and not form.given and not any(form.fixed.values())
+    region = None
+    if is_free and before is None and effort == "whole":
+        region = map_region(named[0].arm, task.chain, task.requirements)
+    if region is None:
+        return task.find(named, before, effort)
+    law = region.start
+    x = np.clip(form.at([*law.point]), *form.box)
+    search_at = Search(form, [], 1, 1, ())
+    start = RequiredLaw(Worst(()), search_at, np.inf, x, law, task.goal, ())
+    is_of_speed = task.minimised in ("settling_time_s", "time_constant_s")
+    is_near = is_of_speed and region.met.any() and len(named) == 1
     found: RequiredLaw | None = None
     failure = ConvergenceError("", None, None)
     try:
-        found = task.find(named, before, effort)
+        found = task.find(named, start, "near" if is_near else effort)
     except ConvergenceError as error:
         failure = error
-    form = task.form
-    has_map = (
-        form.name == TWO_GAINS and not form.given and not any(form.fixed.values()) and effort != "sketch"
-    )
-    if has_map and (found is None or found.violation > 0):
-        gains = recommended_gains(named[0].arm, task.chain)
-        if gains is not None:
-            x = np.clip(form.at([*gains.law.point]), *form.box)
-            judges = tuple(task.judge(each.arm, task.goal, 0) for each in named)
-            chosen = task.examine(named, judges, Search(form, [(0.0, x)], 1, 1, ()), x, task.goal)
-            if chosen.violation < (np.inf if found is None else found.violation):
-                found = chosen
+    if found is None or found.violation > 0:
+        judges = tuple(task.judge(each.arm, task.goal, 0) for each in named)
+        chosen = task.examine(named, judges, search_at, x, task.goal)
+        if chosen.violation < (np.inf if found is None else found.violation):
+            found = chosen
     if found is None:
         raise failure
     return found
+
+
+@lru_cache(maxsize=8)
+def recommended_gains(arm: Arm, chain: Chain) -> tuple[Design | None, str]:
+    """Return the design by default of an arm, and the reason where there is none."""
+    try:
+        return design(arm, chain=chain), ""
+    except TfarmError as error:
+        return None, str(error)
 
 
 def trade_off(
@@ -462,7 +478,7 @@ def _record(
         on_arms.append(OnArm(name, numbers, value, stability(on_arm), sampled_brief(on_arm)))
     at_ends = own.at_ends(x)
     physical = own.ends(physical=True)
-    coefficients = own.by_name(own.coefficients(x).tolist())
+    coefficients = own.by_name(own.typed(x))
     if isinstance(law, Law) and law.anti_windup:
         coefficients["anti_windup_s"] = law.anti_windup
     return Design(

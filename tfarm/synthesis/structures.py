@@ -38,6 +38,8 @@ Ends = list[tuple[int, int]]
 
 # of the usual size: the unit of a positive coefficient
 LOGARITHMIC = 1e-8
+# of a coefficient of a law that was found: as many as a person types
+TYPED_DIGITS = 6
 # of a coefficient's usual size, up and down: its first bounds
 REACH = np.exp(4.0)
 
@@ -144,13 +146,18 @@ class Structure:
         """Return all coefficients by name, the fixed ones first."""
         return self.fixed | dict(zip(self.names, free, strict=True))
 
+    def typed(self, x: Real) -> list[float]:
+        """Return the coefficients at x (n,) to `TYPED_DIGITS`, within the bounds."""
+        rounded = [float(f"{value:.{TYPED_DIGITS}g}") for value in self.coefficients(x).tolist()]
+        return [float(np.clip(value, *each.bounds)) for value, each in zip(rounded, self.free, strict=True)]
+
     def record_at(self, x: Real) -> AnyLaw:
-        """Return the law at x (n,), as a record."""
-        c = self.coefficients(x)
+        """Return the law at x (n,), as a record, its coefficients as they are `typed`."""
+        c = self.typed(x)
         if self.name == TWO_GAINS:
-            return HubFeedback(**self.by_name(c.tolist()))
+            return HubFeedback(**self.by_name(c))
         blocks = {}
-        for signal, num, den in self.entries(c[:, None]):
+        for signal, num, den in self.entries(np.transpose([c])):
             blocks[signal] = tuple(num[:, 0].tolist()), tuple(den[:, 0].tolist())
         law = Law(blocks, name=self.name, references=tuple(blocks))
         return with_anti_windup(law) if self.is_limited else law
