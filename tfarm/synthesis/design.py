@@ -27,7 +27,7 @@ from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.sampled_brief import sampled_brief
 from tfarm.loop.stability import stability
 from tfarm.records import frozen
-from tfarm.synthesis.drawn import AnyStudy, drawn_arms, verify, violation_on
+from tfarm.synthesis.drawn import AnyStudy, drawn_arms, verify
 from tfarm.synthesis.judge import LOST, OBJECTIVES, TOO_SLOW, Judge, judge_of, model_sizes
 from tfarm.synthesis.required import (
     RequiredLaw,
@@ -163,7 +163,7 @@ def design(
     if is_of_drawn:
         require_that(box is None, "range", ranges, "a study or posterior has its own ranges: leave these out")
         drawn = drawn_arms(arm, study, posterior, fresh)
-        worst = partial(violation_on, search_for)
+        worst = search_for.violation_on
     found, named, case = for_the_worst(
         arms, box or drawn, partial(_find_or_good_gains, search_for), worst, options.tell
     )

@@ -202,7 +202,7 @@ def _measured(judge: Judge, goal: Goal, arm: Arm, x: Real, y: Real) -> GoodRegio
     for some in np.array_split(left, left.size // 100 + 1):
         if some.size:
             own = of_laws(entries, some)
-            sampled = LoopMeasures(judge.model, own, judge.model.poles(own), judge.chain.sampling.period)
+            sampled = LoopMeasures(judge.model, own, judge.chain.sampling.period)
             worst = np.max(goal.violations(judge, sampled), axis=0)
             excess[some] = np.minimum(worst, UNSTABLE_EXCESS)
             time_constant[some] = sampled.dominant_time_constant(first_frequency(arm))

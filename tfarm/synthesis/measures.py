@@ -13,18 +13,25 @@ import numpy as np
 
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.records import frozen
-from tfarm.synthesis.judge import damping_of, delay, disk_of, dominant_time_constant, gain_crossings, peak_of
+from tfarm.synthesis.judge import (
+    damping_of,
+    delay,
+    disk_of,
+    dominant_time_constant,
+    gain_crossings,
+    least_of,
+    peak_of,
+)
 from tfarm.synthesis.models import DesignModel
 from tfarm.synthesis.structures import Entry
 
 
 @frozen
 class LoopMeasures:
-    """The measures of laws on a model: `entries` of laws, their closed-loop `poles` (laws, n) where these are known."""
+    """The measures of laws, by their `entries`, on a model at the samples of a `period` [s], or in continuous time."""
 
     model: DesignModel
     entries: Sequence[Entry]
-    poles: Complex
     period: float
 
     @cached_property
@@ -32,29 +39,37 @@ class LoopMeasures:
         """The loop function (laws, m) on the grid."""
         return self.model.loop(self.entries)
 
+    @cached_property
+    def poles(self) -> Complex:
+        """The closed-loop poles (laws, n)."""
+        return self.model.poles(self.entries)
+
+    @property
+    def growth(self) -> Real:
+        """The largest growth of a pole (laws,), below 0 where the loop is stable."""
+        return np.asarray(self.model.growth(self.poles).max(axis=1))
+
     def gain_margin_db(self) -> Real:
         """Return the least factor on the loop gain [dB], up or down, that brings L to -1 (laws,)."""
-        size = abs(self.L)
-        real = self.L.real
-        imag = self.L.imag
-        change = np.diff(imag, axis=1)
-        crosses = (imag[:, 1:] * imag[:, :-1] <= 0) & (change != 0)
-        share = -imag[:, :-1] / np.where(crosses, change, 1.0)
-        at = real[:, :-1] + share * np.diff(real, axis=1)
+        L = self.L
+        is_up = L.imag > 0
+        law, place = np.nonzero(is_up[:, 1:] != is_up[:, :-1])
+        here = L[law, place]
+        there = L[law, place + 1]
+        at = here.real - here.imag / (there.imag - here.imag) * (there.real - here.real)
         # through a pole L passes infinity, and the line between the points not the value of L
-        passes = crosses & (at < 0) & (-at > 0.1 * np.minimum(size[:, 1:], size[:, :-1]))
-        least = np.where(passes, abs(np.log10(np.maximum(-at, LEAST_SIZE))), np.inf).min(axis=1)
+        passes = (at < 0) & (-at > 0.1 * np.minimum(abs(here), abs(there)))
+        least = least_of(law[passes], abs(np.log10(np.maximum(-at[passes], LEAST_SIZE))), len(L), np.inf)
         if self.model.period is not None:
             # at z = -1, the end of the grid, L is real
-            end = real[:, -1]
+            end = L.real[:, -1]
             least = np.where(end < 0, np.minimum(least, abs(np.log10(np.maximum(-end, LEAST_SIZE)))), least)
         return 20 * least
 
     def phase_margin_deg(self) -> Real:
         """Return the least distance [deg] of L from -1 where abs(L) passes 1 (laws,)."""
-        passes, _, late = gain_crossings(self.L)
-        nearest = np.minimum(late, 2 * np.pi - late)
-        return np.degrees(np.where(passes, nearest, np.inf).min(axis=1))
+        law, _, _, lag = gain_crossings(self.L)
+        return np.degrees(least_of(law, np.minimum(lag, 2 * np.pi - lag), len(self.L), np.inf))
 
     def delay_margin_periods(self) -> Real:
         """Return the delay margin in sampling periods (laws,)."""
@@ -62,7 +77,7 @@ class LoopMeasures:
 
     def peak_sensitivity(self) -> Real:
         """Return the largest abs(S) on the grid (laws,)."""
-        return np.asarray(peak_of(self.model, abs(1 + self.L).min(axis=1)))
+        return np.asarray(peak_of(self.model, np.sqrt(((1 + self.L.real) ** 2 + self.L.imag**2).min(axis=1))))
 
     def disk_margin(self) -> Real:
         """Return the least 2 abs(1 + L)/abs(1 - L) (laws,)."""
