@@ -131,7 +131,7 @@ def test_the_norm_on_the_model_is_that_of_what_the_controller_reads(chain):
     model = replace(judge_of(LAB, LAB, chain, "damping", form.signals, 2, 8).model, weights=weights)
     coefficients = np.array([[0.5, 1.0, 2.0]])
     entries = form.entries(coefficients)
-    found = LoopMeasures(model, entries, model.poles(entries), chain.sampling.period).stacked_norm()
+    found = LoopMeasures(model, entries, chain.sampling.period).stacked_norm()
     for K1, value in zip(coefficients[0], found, strict=True):
         bound = exact_values(Case(LAB, HubFeedback(K1=K1, K2=0.0, Kp=0.5), chain), None, weights).sampled[
             "stacked_norm"
@@ -156,7 +156,7 @@ def test_measures_on_the_model_are_those_of_the_exact_card(seed):
     for model, loop, drawn in ((judge.model, card.sampled, curve), (judge.also[0], card.continuous, curve.continuous)):
         n = int((drawn.complementary < -3.0103).argmax())
         down = np.interp(3.0103, -drawn.complementary[n - 1 : n + 1], drawn.omega[n - 1 : n + 1])
-        found = LoopMeasures(model, entries, model.poles(entries), 0.01)
+        found = LoopMeasures(model, entries, 0.01)
         gain = min(loop.gain_margin.value, loop.gain_reduction.value)
         # a crossover far from -1 may lie between two points of the grid
         assert min(found.gain_margin_db()[0], 20.0) == pytest.approx(min(gain, 20.0), rel=1e-2)
@@ -170,7 +170,7 @@ def test_measures_on_the_model_are_those_of_the_exact_card(seed):
         assert found.bandwidth_rad_s()[0] == pytest.approx(down, rel=1e-2)
     weights = weights_of(WEIGHTS)
     values = exact_values(Case(LAB, law), None, weights).sampled
-    sampled = LoopMeasures(replace(judge.model, weights=weights), entries, judge.model.poles(entries), 0.01)
+    sampled = LoopMeasures(replace(judge.model, weights=weights), entries, 0.01)
     assert sampled.bandwidth_rad_s()[0] == pytest.approx(values["bandwidth_rad_s"], rel=2e-3)
     assert sampled.stacked_norm()[0] == pytest.approx(values["stacked_norm"], rel=2e-3)
 

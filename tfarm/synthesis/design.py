@@ -31,7 +31,7 @@ from tfarm.loop.norms import weight_sizes
 from tfarm.loop.sampled_brief import sampled_brief
 from tfarm.loop.stability import stability
 from tfarm.records import frozen
-from tfarm.synthesis.drawn import AnyStudy, drawn_arms, verify, violation_on
+from tfarm.synthesis.drawn import AnyStudy, drawn_arms, verify
 from tfarm.synthesis.goals import norm_bound
 from tfarm.synthesis.good_region import map_region
 from tfarm.synthesis.judge import LOST, OBJECTIVES, TOO_SLOW, Judge, judge_of, model_sizes
@@ -177,7 +177,7 @@ def design(
     if is_of_drawn:
         require_that(box is None, "range", ranges, "a study or posterior has its own ranges: leave these out")
         drawn = drawn_arms(arm, study, posterior, fresh)
-        worst = partial(violation_on, search_for)
+        worst = search_for.violation_on
     found, named, case = for_the_worst(
         arms, box or drawn, partial(_find_near_map, search_for), worst, options.tell
     )

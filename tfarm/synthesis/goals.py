@@ -35,8 +35,9 @@ from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.gains import turning_inertia
 from tfarm.spectrum.table import first_frequency
-from tfarm.synthesis.judge import LOST, slowest_allowed
+from tfarm.synthesis.judge import LOST, lost, of_laws, slowest_allowed
 from tfarm.synthesis.measures import LoopMeasures
+from tfarm.synthesis.models import DesignModel
 from tfarm.synthesis.requirements import NORM, Requirement
 from tfarm.synthesis.slew_measures import SlewMeasures
 from tfarm.synthesis.structures import Entry
@@ -44,6 +45,8 @@ from tfarm.synthesis.worst_case import NamedArm
 
 # ln |z| of a loop with the delay of its requirement, which counts as a violation of 1
 GROWTH_OF_DELAY = 0.05
+# requirements on poles, the others on the loop function
+OF_POLES = ("least_damping", "time_constant_s", NORM)
 # of the scores, times a violation
 WEIGHT = 30.0
 # of the time constant, in the score of a settling time: it decides where the tip is at rest when the motion ends
@@ -87,72 +90,101 @@ class Goal:
         shifts = self.shifts[loop] or (0.0,) * len(self.requirements)
         return zip(self.requirements, shifts, strict=True)
 
-    def scores(self, judge: Any, entries: Sequence[Entry], poles: Any) -> Real:
-        """Return the scores of laws that are stable on the model (laws,)."""
-        sampled = LoopMeasures(judge.model, entries, poles, judge.chain.sampling.period)
+    def aims(self, judge: Any, entries: Sequence[Entry], limits: Real) -> Real:
+        """Return the scores of laws (laws,), `LOST` and more where the model is unstable; any value above their limits.
+
+        Margins of the sampled loop are first: most laws are above their limit by these, whatever their speed.
+        """
+        scores = slowness(judge, entries) + self._least(judge)
+        for stage in (self._margins, self._speeds, self._continuous, self._delays):
+            left = np.flatnonzero(scores <= limits)
+            if left.size:
+                scores[left] += stage(judge, of_laws(entries, left))
+        return scores
+
+    def _least(self, judge: Any) -> float:
+        """Return a lower bound of the logarithm of the value."""
+        if _is_of_slew(self.minimised) or self.minimised == "time_constant_s":
+            # half the time constant of a pole at twice the first frequency
+            return float(np.log(0.25 / first_frequency(judge.arm)))
+        return float(np.log(LEAST_SIZE))
+
+    def _margins(self, judge: Any, entries: Sequence[Entry]) -> Real:
+        """Return the penalties of requirements on the loop function (laws,)."""
+        return self._penalty(self.loop_violations(0, measures_of(judge, entries), (False,)))
+
+    def _speeds(self, judge: Any, entries: Sequence[Entry]) -> Real:
+        """Return the logarithm of the value above its bound, with the penalties of requirements on poles (laws,)."""
+        loop = measures_of(judge, entries)
+        growth = loop.growth
+        scores = np.log(self.value(judge, loop)) - self._least(judge)
+        scores += self._penalty(self.loop_violations(0, loop, (True,)))
+        return np.where(growth < 0, scores, lost(1, growth))
+
+    def _continuous(self, judge: Any, entries: Sequence[Entry]) -> Real:
+        """Return the penalties of the continuous-time loop (laws,)."""
+        return self._penalty(self.loop_violations(1, measures_of(judge, entries, judge.also[0])))
+
+    def _delays(self, judge: Any, entries: Sequence[Entry]) -> Real:
+        """Return the penalties of unstable loops with the delays required (laws,)."""
+        return self._penalty(self._delay_violations(judge, entries))
+
+    def value(self, judge: Any, sampled: LoopMeasures) -> Real:
+        """Return the quantity that is minimised, in place of one of the slew the dominant time constant (laws,)."""
         if _is_of_slew(self.minimised):
-            value = sampled.dominant_time_constant(first_frequency(judge.arm))
-        else:
-            value = sampled.of(self.minimised)
-        return (
-            np.log(np.maximum(value, LEAST_SIZE)) + slowness(judge, entries) + self._penalty(judge, sampled)
-        )
+            return sampled.dominant_time_constant(first_frequency(judge.arm))
+        return np.maximum(sampled.of(self.minimised), LEAST_SIZE)
+
+    def _penalty(self, violations: Iterable[Real]) -> Real:
+        """Return the weighted sum of violations (laws,)."""
+        return np.asarray(self.weight * sum(np.maximum(each, 0.0) for each in violations))
+
+    def loop_violations(
+        self, number: int, loop: LoopMeasures, of_poles: tuple[bool, ...] = (False, True)
+    ) -> list[Real]:
+        """Return the violations (laws,) of each requirement of the sampled (0) or the continuous-time loop (1)."""
+        found = []
+        for each, shift in self.shifted(number):
+            if each.measure.is_of(number) and (each.name in OF_POLES) in of_poles:
+                found.append(each.violations(loop.of(each.name)) + shift)
+        return found
+
+    def _delay_violations(self, judge: Any, entries: Sequence[Entry]) -> list[Real]:
+        """Return the growth (laws,) with the delays: the loop function leaves out that signals are read late."""
+        growth = [measures_of(judge, entries, model).growth for model in judge.delayed]
+        return [np.max(growth, axis=0) / GROWTH_OF_DELAY] if growth else []
 
     def violations(self, judge: Any, sampled: LoopMeasures) -> list[Real]:
         """Return the violations (laws,) of each requirement of the loops, those of the sampled one first."""
-        found = []
-        loops = [sampled]
-        if judge.also:
-            other = judge.also[0]
-            needs_poles = any(each.name in ("time_constant_s", "least_damping") for each in self.requirements)
-            poles = other.poles(sampled.entries) if needs_poles else sampled.poles
-            loops.append(LoopMeasures(other, sampled.entries, poles, sampled.period))
-        for number, loop in enumerate(loops):
-            for each, shift in self.shifted(number):
-                if not each.measure.is_of(number):
-                    continue
-                violation = each.violations(loop.of(each.name)) + shift
-                if each.name == "delay_margin_periods" and loop is sampled and judge.delayed:
-                    # the crossovers of L leave out how a late input changes what is read; these models have the shift
-                    growth = [of.growth(of.poles(sampled.entries)).max(axis=1) for of in judge.delayed]
-                    violation = np.maximum(violation, np.max(growth, axis=0) / GROWTH_OF_DELAY)
-                found.append(violation)
-        return found
-
-    def _penalty(self, judge: Any, sampled: LoopMeasures) -> Real:
-        """The weighted violations of requirements on the loops (laws,)."""
-        total = np.zeros(sampled.L.shape[0])
-        for violation in self.violations(judge, sampled):
-            total += self.weight * np.maximum(violation, 0.0)
-        return total
+        entries = sampled.entries
+        return [
+            *self.loop_violations(0, sampled),
+            *self.loop_violations(1, measures_of(judge, entries, judge.also[0])),
+            *self._delay_violations(judge, entries),
+        ]
 
     def excess(self, judges: Sequence[Any], law: AnyLaw) -> float:
         """Return the sum of violations of a law on the models, the largest of the arms, without shifts."""
-        plain = replace(self, shifts=((), ()))
+        plain = replace(self, shifts=((), ()), weight=1.0)
         found = []
         for judge in judges:
-            entries = judge.entries(law)
-            loop = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
-            found.append(float(plain._penalty(judge, loop)[0]) / self.weight)
+            loop = measures_of(judge, judge.entries(law))
+            found.append(float(plain._penalty(plain.violations(judge, loop))[0]))
         return max(found)
 
     def simulated_score(self, judge: Any, slew: SlewMeasures, law: AnyLaw) -> float:
         """Return the score of one law with its slew; `LOST` where it is unstable on the model, or has no figure."""
-        entries = judge.entries(law)
-        if any(model.growth(model.poles(entries)).max() >= 0 for model in (judge.model, *judge.also)):
-            return LOST
-        measures = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
-        score = float((slowness(judge, entries) + self._penalty(judge, measures))[0])
-        speed = float(measures.dominant_time_constant(first_frequency(judge.arm))[0])
+        score = float(judge.score(law))
+        if score >= LOST or not self.by_simulation:
+            return score
         figures = slew.of(law)
-        if self.minimised.endswith("settling_time_s"):
-            # a tip that does not settle in the longest record: of such laws the fastest is the best
-            settled = min(figures[self.minimised], 100.0 * speed)
-            score += float(np.log(settled + SHARE_OF_SPEED * speed))
-        elif _is_of_slew(self.minimised):
-            score += float(np.log(max(figures[self.minimised], LEAST_SIZE)))
-        else:
-            score += float(np.log(max(float(measures.of(self.minimised)[0]), LEAST_SIZE)))
+        if _is_of_slew(self.minimised):
+            speed = float(self.value(judge, measures_of(judge, judge.entries(law)))[0])
+            value = figures[self.minimised]
+            if self.minimised.endswith("settling_time_s"):
+                # a tip that does not settle in the longest record: of such laws the fastest is the best
+                value = min(value, 100.0 * speed) + SHARE_OF_SPEED * speed
+            score += float(np.log(max(value, LEAST_SIZE) / speed))
         for each, shift in self.shifted(0):
             if each.measure.of_slew:
                 score += self.weight * max(each.violation(figures[each.name]) + shift, 0.0)
@@ -167,6 +199,11 @@ class Goal:
     def within_one_per_cent(score: float) -> float:
         """Return the score of a value one per cent larger."""
         return score + 0.01
+
+
+def measures_of(judge: Any, entries: Sequence[Entry], model: DesignModel | None = None) -> LoopMeasures:
+    """Return the measures of laws in the sampled loop of a judge, or in another of its models."""
+    return LoopMeasures(model or judge.model, entries, judge.chain.sampling.period)
 
 
 def slowness(judge: Any, entries: Sequence[Entry]) -> Real:
@@ -199,8 +236,11 @@ def _is_of_slew(name: str) -> bool:
     return Requirement(name, "<=", 1.0).measure.of_slew
 
 
-def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real) -> Real:
-    """Return the point of a simplex that begins at x, with the slew simulated on every arm."""
+def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real, share: float) -> Real:
+    """Return the point of a simplex that begins at x, with the slew simulated on every arm.
+
+    `share` is that of its usual size and number of steps.
+    """
     # modes of a slew that is simulated hundreds of times
     modes = 8
     names = (goal.minimised, *(each.name for each in goal.requirements))
@@ -212,8 +252,10 @@ def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real) -> Real:
         return max(goal.simulated_score(judge, slew, law) for judge, slew in zip(judges, slews, strict=True))
 
     low, high = form.box
-    edges = np.diag(np.where(x + 0.02 * (high - low) > high, -1.0, 1.0) * 0.02 * (high - low))
-    options = {"initial_simplex": [x, *(x + edges)], "maxfev": 60 * form.size, "adaptive": form.size > 2}
+    step = 0.02 * share * (high - low)
+    edges = np.diag(np.where(x + step > high, -step, step))
+    most = int(60 * share * form.size)
+    options = {"initial_simplex": [x, *(x + edges)], "maxfev": most, "adaptive": form.size > 2}
     done = cast("Any", minimize)(
         score, x, method="Nelder-Mead", bounds=np.transpose(form.box), options=options
     )

@@ -24,9 +24,8 @@ from tfarm.loop.plane import Plane, gain_map, moment_axis
 from tfarm.loop.plane_axes import Axis, rate_axis
 from tfarm.records import frozen
 from tfarm.spectrum.table import first_frequency
-from tfarm.synthesis.goals import Goal
+from tfarm.synthesis.goals import Goal, measures_of
 from tfarm.synthesis.judge import Judge, of_laws
-from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.models import DesignModel
 from tfarm.synthesis.required import RequirementTask
 from tfarm.synthesis.requirements import GOOD, Requirement
@@ -197,11 +196,10 @@ def _of_laws(judge: Judge, goal: Goal, entries: Sequence[Entry]) -> tuple[Real, 
     time_constant = np.full(laws.size, np.inf)
     # of some laws at once: each has some thousand points of L
     for some in np.array_split(laws, laws.size // 100 + 1):
-        poles = judge.model.poles(of_laws(entries, some))
-        is_stable = judge.model.growth(poles).max(axis=1, initial=-np.inf) < 0
+        growth = judge.model.growth(judge.model.poles(of_laws(entries, some)))
+        is_stable = growth.max(axis=1, initial=-np.inf) < 0
         if is_stable.any():
-            own = of_laws(entries, some[is_stable])
-            sampled = LoopMeasures(judge.model, own, poles[is_stable], judge.chain.sampling.period)
+            sampled = measures_of(judge, of_laws(entries, some[is_stable]))
             worst = np.max(goal.violations(judge, sampled), axis=0)
             excess[some[is_stable]] = np.minimum(worst, UNSTABLE_EXCESS)
             time_constant[some[is_stable]] = sampled.dominant_time_constant(first_frequency(judge.arm))

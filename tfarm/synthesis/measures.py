@@ -14,18 +14,25 @@ import numpy as np
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.loop.norms import STACKED, weight_sizes, weighted_sizes
 from tfarm.records import frozen
-from tfarm.synthesis.judge import damping_of, delay, disk_of, dominant_time_constant, gain_crossings, peak_of
-from tfarm.synthesis.models import DesignModel
+from tfarm.synthesis.judge import (
+    damping_of,
+    delay,
+    disk_of,
+    dominant_time_constant,
+    gain_crossings,
+    least_of,
+    peak_of,
+)
+from tfarm.synthesis.models import DesignModel, controllers
 from tfarm.synthesis.structures import Entry
 
 
 @frozen
 class LoopMeasures:
-    """The measures of laws on a model: `entries` of laws, their closed-loop `poles` (laws, n) where these are known."""
+    """The measures of laws, by their `entries`, on a model at the samples of a `period` [s], or in continuous time."""
 
     model: DesignModel
     entries: Sequence[Entry]
-    poles: Complex
     period: float
 
     @cached_property
@@ -34,37 +41,50 @@ class LoopMeasures:
         return self.model.loop(self.entries)
 
     @cached_property
-    def gain_factors(self) -> Real:
-        """log10 of -L (laws, k) where L passes the negative real axis, inf elsewhere."""
-        size = abs(self.L)
-        real = self.L.real
-        imag = self.L.imag
-        change = np.diff(imag, axis=1)
-        crosses = (imag[:, 1:] * imag[:, :-1] <= 0) & (change != 0)
-        share = -imag[:, :-1] / np.where(crosses, change, 1.0)
-        at = real[:, :-1] + share * np.diff(real, axis=1)
+    def poles(self) -> Complex:
+        """The closed-loop poles (laws, n)."""
+        return self.model.poles(self.entries)
+
+    @property
+    def growth(self) -> Real:
+        """The largest growth of a pole (laws,), below 0 where the loop is stable."""
+        return np.asarray(self.model.growth(self.poles).max(axis=1))
+
+    @cached_property
+    def gain_factors(self) -> tuple[Real, Real]:
+        """The laws (k,) whose L passes the negative real axis, and log10 of -L there (k,)."""
+        L = self.L
+        is_up = L.imag > 0
+        law, place = np.nonzero(is_up[:, 1:] != is_up[:, :-1])
+        here = L[law, place]
+        there = L[law, place + 1]
+        at = here.real - here.imag / (there.imag - here.imag) * (there.real - here.real)
         # through a pole L passes infinity, and the line between the points not the value of L
-        passes = crosses & (at < 0) & (-at > 0.1 * np.minimum(size[:, 1:], size[:, :-1]))
+        passes = (at < 0) & (-at > 0.1 * np.minimum(abs(here), abs(there)))
+        law = law[passes]
+        at = at[passes]
         if self.model.period is not None:
             # at z = -1, the end of the grid, L is real
-            at = np.hstack([at, real[:, -1:]])
-            passes = np.hstack([passes, real[:, -1:] < 0])
-        return np.where(passes, np.log10(np.maximum(-at, LEAST_SIZE)), np.inf)
+            end = L.real[:, -1]
+            (last,) = np.nonzero(end < 0)
+            law = np.r_[law, last]
+            at = np.r_[at, end[last]]
+        return law, np.log10(np.maximum(-at, LEAST_SIZE))
 
     def gain_margin_db(self) -> Real:
         """Return the least factor on the loop gain [dB], up or down, that brings L to -1 (laws,)."""
-        return 20 * abs(self.gain_factors).min(axis=1)
+        law, factors = self.gain_factors
+        return 20 * least_of(law, abs(factors), len(self.L), np.inf)
 
     def gain_reduction_db(self) -> Real:
         """Return the least such factor down (laws,)."""
-        factors = self.gain_factors
-        return 20 * np.where(factors >= 0, factors, np.inf).min(axis=1)
+        law, factors = self.gain_factors
+        return 20 * least_of(law[factors >= 0], factors[factors >= 0], len(self.L), np.inf)
 
     def phase_margin_deg(self) -> Real:
         """Return the least distance [deg] of L from -1 where abs(L) passes 1 (laws,)."""
-        passes, _, late = gain_crossings(self.L)
-        nearest = np.minimum(late, 2 * np.pi - late)
-        return np.degrees(np.where(passes, nearest, np.inf).min(axis=1))
+        law, _, _, lag = gain_crossings(self.L)
+        return np.degrees(least_of(law, np.minimum(lag, 2 * np.pi - lag), len(self.L), np.inf))
 
     def delay_margin_periods(self) -> Real:
         """Return the delay margin in sampling periods (laws,)."""
@@ -76,7 +96,7 @@ class LoopMeasures:
 
     def peak_sensitivity(self) -> Real:
         """Return the largest abs(S) on the grid (laws,)."""
-        return np.asarray(peak_of(self.model, abs(1 + self.L).min(axis=1)))
+        return np.asarray(peak_of(self.model, np.sqrt(((1 + self.L.real) ** 2 + self.L.imag**2).min(axis=1))))
 
     def disk_margin(self) -> Real:
         """Return the least 2 abs(1 + L)/abs(1 - L) (laws,)."""
@@ -126,9 +146,10 @@ class LoopMeasures:
         """Return the size (laws, m) of that column at angles (m,) or (laws, m), of L if known there."""
         model = self.model
         assert model.weights is not None
+        s = model.s_at(angles)
         if L is None:
             L = model.loop(self.entries, angles)
-        K = dict(model.controllers(self.entries, angles))
+        K = dict(controllers(self.entries, s))
         if model.rate is not None:
             # the controller reads the angle in its place
             K["hub_angle"] = K.get("hub_angle", 0.0) + model.rate(np.exp(1j * angles)) * K.pop("hub_rate")

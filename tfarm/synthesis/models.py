@@ -15,7 +15,7 @@ reference has states: its angle, rate and acceleration, constant over each half 
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
@@ -145,31 +145,44 @@ class DesignModel:
         return self.grid()
 
     @cached_property
-    def responses(self) -> Complex:
-        """The signals (signals, m) at all angles."""
-        return self.response(self.angles)
+    def responses(self) -> tuple[Complex, Complex]:
+        """The s (m,) of laws, and the signals (signals, m), at all angles."""
+        return self.responses_at(self.angles)
+
+    def s_at(self, angles: Real) -> Complex:
+        """Return the s of laws at angles, of a sampled loop by Tustin's rule."""
+        s = 1j * angles
+        if self.period is None:
+            return s
+        z = np.exp(s)
+        # at z = -1 Tustin's s is infinite
+        return self.speed * (z - 1) / np.where(abs(z + 1) < 1e-12, 1e-12, z + 1)
+
+    def responses_at(self, angles: Real) -> tuple[Complex, Complex]:
+        """Return the s of laws and the signals (signals, m) or (signals, laws, m) at angles (m,) or (laws, m)."""
+        return self.s_at(angles), self.response(angles.ravel()).reshape(-1, *angles.shape)
 
     def loop(self, entries: Sequence[Entry], angles: Real | None = None) -> Complex:
         """Return L (laws, m) at the model's own angles, or at others (m,) or (laws, m)."""
-        q = self.angles
-        response = self.responses
-        if angles is not None:
-            q = np.asarray(angles)
-            response = self.response(q.ravel()).reshape(-1, *q.shape)
-        total = 0.0
-        for signal, through in self.controllers(entries, q):
+        s, response = self.responses if angles is None else self.responses_at(np.asarray(angles))
+        total: Any = 0.0
+        for signal, through in controllers(entries, s):
             total = total + through * response[self.signals.index(signal)]
         return np.asarray(total)
 
-    def controllers(self, entries: Sequence[Entry], angles: Real) -> Iterator[tuple[str, Complex]]:
-        """Yield each signal with its entry of the laws (laws, m) at angles."""
-        s = 1j * angles
-        if self.period is not None:
-            z = np.exp(s)
-            # at z = -1 Tustin's s is infinite
-            s = self.speed * (z - 1) / np.where(abs(z + 1) < 1e-12, 1e-12, z + 1)
-        for signal, num, den in entries:
-            yield signal, np.polyval(num[:, :, None], s) / np.polyval(den[:, :, None], s)
+
+def controllers(entries: Sequence[Entry], s: Complex) -> Iterator[tuple[str, Complex]]:
+    """Yield each signal with its entry of the laws (laws, m) at s (m,) or (laws, m)."""
+    for signal, num, den in entries:
+        yield signal, values_of(num, s) / values_of(den, s)
+
+
+def values_of(polynomial: Real, s: Complex) -> Any:
+    """Return polynomials (degree + 1, laws) at s (m,), (laws, m); of constants (laws, 1)."""
+    total: Any = polynomial[0][:, None]
+    for row in polynomial[1:]:
+        total = total * s + row[:, None]
+    return total
 
 
 def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int, speed: float) -> DesignModel:
