@@ -438,7 +438,7 @@ def _record(
         objective=task.objective,
         structure=own.name,
         law=law,
-        coefficients=own.by_name(own.typed(x)),
+        coefficients=own.by_name(own.coefficients(x).tolist()),
         value=objective.worst([each.value for each in on_arms]),
         verdict=on_arms[0].verdict,
         bounds={each.name: each.bounds for each in own.free},
