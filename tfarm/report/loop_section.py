@@ -94,15 +94,16 @@ def nyquist_section(report: ArmReport) -> PageSection:
     """Return the loop function of each controller on a contour that hides nothing, its encirclements counted."""
     blocks: list[Picture | Table] = []
     counts: dict[str, Nyquist] = {}
-    for each in report.in_s:
+    shown = report.in_s
+    for each in shown:
         counts[each.title] = found = each.nyquist
-        # of the recommended gains the Bode plot has the numbers, and large arcs are those of the same signals
-        is_own = each.key != "recommended"
+        # next to recommended gains, the default ones have the numbers of their Bode plot, and large arcs alike
+        is_full = bool(report.laws) or each is shown[-1]
         linear = loop_function.nyquist.figure(found, name=each.name)
-        data = curve_table(found) if is_own else ()
+        data = curve_table(found) if is_full else ()
         stem = each.stem("nyquist")
         blocks.append(picture_block("nyquist_plot", linear, stem=stem, data=data, each=each, found=found))
-        if is_own:
+        if is_full:
             disc = loop_function.disc.figure(found, name=each.name)
             blocks.append(picture_block("nyquist_disc", disc, stem=f"{stem}-disc", each=each, found=found))
     own = any(found.unstable_open for found in counts.values())

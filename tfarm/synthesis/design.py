@@ -478,7 +478,7 @@ def _record(
         on_arms.append(OnArm(name, numbers, value, stability(on_arm), sampled_brief(on_arm)))
     at_ends = own.at_ends(x)
     physical = own.ends(physical=True)
-    coefficients = own.by_name(own.typed(x))
+    coefficients = own.by_name(own.coefficients(x).tolist())
     if isinstance(law, Law) and law.anti_windup:
         coefficients["anti_windup_s"] = law.anti_windup
     return Design(

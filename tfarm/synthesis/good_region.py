@@ -141,7 +141,7 @@ def good_region(
 def map_region(arm: Arm, chain: Chain, requirements: tuple[Requirement, ...]) -> GoodRegion | None:
     """Return the region in the map of an arm, of the requirements on its loops; None as above, or of none of these."""
     x = rate_axis(arm)
-    of_loops = tuple(each for each in requirements if not each.measure.of_slew)
+    of_loops = tuple(each for each in requirements if each.measure.is_of(1))
     return good_region(arm, x, moment_axis(arm, x), chain, of_loops) if of_loops else None
 
 

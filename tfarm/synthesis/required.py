@@ -214,7 +214,9 @@ class RequirementTask:
     ) -> RequiredLaw:
         """Return the law at x with the exact values of all requirements on each arm."""
         form = found.form
-        law = form.record_at(x)
+        coefficients = form.typed(x)
+        law = form.record_of(coefficients)
+        x = form.at(coefficients)
         score = float(Worst(judges).scores(form, x[:, None])[0])
         rows = []
         violations = np.full((2, len(self.requirements)), -1.0)

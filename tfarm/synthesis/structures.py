@@ -38,7 +38,7 @@ Ends = list[tuple[int, int]]
 
 # of the usual size: the unit of a positive coefficient
 LOGARITHMIC = 1e-8
-# of a coefficient of a law that was found: as many as a person types
+# of the gains of a law that was found: as many as a person types
 TYPED_DIGITS = 6
 # of a coefficient's usual size, up and down: its first bounds
 REACH = np.exp(4.0)
@@ -147,13 +147,18 @@ class Structure:
         return self.fixed | dict(zip(self.names, free, strict=True))
 
     def typed(self, x: Real) -> list[float]:
-        """Return the coefficients at x (n,) to `TYPED_DIGITS`, within the bounds."""
-        rounded = [float(f"{value:.{TYPED_DIGITS}g}") for value in self.coefficients(x).tolist()]
-        return [float(np.clip(value, *each.bounds)) for value, each in zip(rounded, self.free, strict=True)]
+        """Return the coefficients at x (n,), gains at the hub to `TYPED_DIGITS`."""
+        found = self.coefficients(x).tolist()
+        if self.name == TWO_GAINS:
+            return [float(f"{value:.{TYPED_DIGITS}g}") for value in found]
+        return found
 
     def record_at(self, x: Real) -> AnyLaw:
-        """Return the law at x (n,), as a record, its coefficients as they are `typed`."""
-        c = self.typed(x)
+        """Return the law at x (n,), as a record."""
+        return self.record_of(self.coefficients(x).tolist())
+
+    def record_of(self, c: Sequence[float]) -> AnyLaw:
+        """Return the law of coefficients (n,), as a record."""
         if self.name == TWO_GAINS:
             return HubFeedback(**self.by_name(c))
         blocks = {}
