@@ -224,6 +224,11 @@ def test_the_poles_of_the_modes_are_those_of_the_sampled_loop():
         found = loop_modes(Case(LAB, law))
         assert sorted(found) == [1, 2]
         assert all(abs(poles - z).min() < 1e-12 for z in found.values())
+    # a pair of damping ratio 0.97 next to where mode 1 is overdamped
+    law = tfarm.HubFeedback(K1=9.7, K2=0.112)
+    z = sampled_loop(Case(LAB, law)).poles.z
+    assert ((np.angle(z) > 0) & (np.angle(z) < 0.2) & (abs(z) > 0.6)).any()
+    assert sorted(loop_modes(Case(LAB, law))) == [2]
 
 
 @pytest.mark.parametrize("kind", BUILDERS)

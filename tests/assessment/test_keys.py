@@ -88,8 +88,7 @@ def designed(arm, chain):
     """What a design is judged by: its objectives, and the verdict that is printed with it."""
     values = [
         judge_of(arm, arm, chain, objective, ("hub_rate", "root_moment"), 2, 8).value(GAINS)
-        # a shaper has the impulses of one loop, and these objectives many laws at once
-        for objective in ("damping", "residual")[: 1 if chain.reference.shaper != "none" else 2]
+        for objective in ("damping", "residual")
     ]
     values += SlewMeasures(arm, arm, chain, 8).of(GAINS).values()
     return values, sampled_brief(Case(arm, GAINS, chain)).words
@@ -188,7 +187,7 @@ def test_every_key_has_a_stage_and_every_consumer_states_stages_that_there_are()
     for consumer in ANSWERS:
         stated = [*consumer.acts, *consumer.named, *consumer.partly, *consumer.none]
         # which are refused
-        left = ["shaper"] * (consumer is tuner.CONSUMER)
+        left = ["shaper"] * (consumer is tuner_code.CONSUMER)
         assert sorted([*stated, *left]) == sorted(stage.name for stage in STAGES), consumer.name
 
 

@@ -206,6 +206,8 @@ def test_the_shaper_of_another_arm_is_that_of_the_nominal_one(kind):
         is_counted = (run.t >= task.busy_until - 1e-9) & (run.t <= task.busy_until + left + 1e-9)
         moment = (run.at_samples.root_moment - task.rigid_moment)[is_counted]
         assert judge.score(law) == pytest.approx(math.sqrt(np.mean(moment**2)), rel=1e-8)
+        assert judge.is_confirmed(law, judge.score(law))
+        assert not judge.is_confirmed(law, 0.9 * judge.score(law))
 
 
 @pytest.mark.parametrize("chain", CHAINS, ids=NAMED)

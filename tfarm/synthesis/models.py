@@ -466,17 +466,19 @@ class Slews:
         return np.asarray((outputs**2).sum(axis=(1, 2)))
 
     def _impulses(self, entries: Sequence[Entry]) -> list[Real]:
-        """Return the impulses of the shaper under each law; nan for an unstable loop."""
+        """Return the impulses of the shaper under each law; nan for an unstable loop, and one too slow for its slew."""
         nominal = self.nominal
         law = nominal.states(entries)
         reference = self.chain.reference
-        # fewer than of a law that is exported: a search has thousands
         matrices = np.stack([nominal.closed_matrices(law, share) for share in SHARES.tolist()], axis=1)
         found = [np.full(1, np.nan)] * len(matrices)
+        # angle of a mode whose half period takes 20 slews
+        slowest = np.pi * self.chain.sampling.period / (20 * self.chain.slew.rise_time)
         is_stable = nominal.growth(nominal.poles(entries)).max(axis=1) < 0
         for n in np.flatnonzero(is_stable).tolist():
             poles = modes_under(matrices[n], nominal.alone)
-            found[n] = impulses_at(poles, reference.shaper, reference.modes)
+            if np.angle([*poles.values()]).min(initial=np.inf) > slowest:
+                found[n] = impulses_at(poles, reference.shaper, reference.modes)
         return found
 
     @cached_property
