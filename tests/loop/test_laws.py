@@ -242,7 +242,7 @@ def test_spillover_in_words(name):
     unstable, poles, words = FOUND[name]
     loop = SimpleNamespace(arm=LAB)
     verdict = SimpleNamespace(
-        poles=SimpleNamespace(moving=np.array(poles, complex)), loop=loop, band=300.0, word="stable",
+        poles=SimpleNamespace(nonzero=np.array(poles, complex)), loop=loop, band=300.0, word="stable",
         is_known_beyond=False,
     )  # fmt: skip
     found = Spill(verdict, np.arange(1, 4), np.array(unstable), np.array([-1.0, 1 - 2j, 2.0]))
