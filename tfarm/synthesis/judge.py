@@ -113,7 +113,7 @@ def longest_delay(model: DesignModel) -> float:
     return 100.0 * (model.period or 1.0)
 
 
-def _passing_delay(model: DesignModel, crossings: "Crossings", laws: int) -> Real:
+def _passing_delay(model: DesignModel, crossings: "GainCrossings", laws: int) -> Real:
     """Return that delay [s] by the passages between points of the grid alone, at most the longest."""
     q = model.angles
     n = crossings.place
@@ -121,7 +121,7 @@ def _passing_delay(model: DesignModel, crossings: "Crossings", laws: int) -> Rea
     return least_of(crossings.law, (model.period or 1.0) * late, laws, longest_delay(model))
 
 
-class Crossings(NamedTuple):
+class GainCrossings(NamedTuple):
     """Passages of |L| through 1 of many laws: number of the `law`, and point of the grid before, each (k,).
 
     The `share` of the way to the next point and the `lag` to -1 [rad], in [0, 2 pi), are along straight lines.
@@ -133,7 +133,7 @@ class Crossings(NamedTuple):
     lag: Real
 
 
-def gain_crossings(L: Complex) -> Crossings:
+def gain_crossings(L: Complex) -> GainCrossings:
     """Return the passages of |L| (laws, m) through 1 between two points of the grid."""
     is_above = L.real**2 + L.imag**2 > 1.0
     law, place = np.nonzero(is_above[:, 1:] != is_above[:, :-1])
@@ -142,7 +142,7 @@ def gain_crossings(L: Complex) -> Crossings:
     size = np.log(np.maximum(abs(here), LEAST_SIZE))
     share = size / (size - np.log(np.maximum(abs(there), LEAST_SIZE)))
     step = np.angle(there * here.conj())
-    return Crossings(law, place, share, np.mod(np.pi + np.angle(here) + share * step, 2 * np.pi))
+    return GainCrossings(law, place, share, np.mod(np.pi + np.angle(here) + share * step, 2 * np.pi))
 
 
 def least_of(law: Any, values: Real, laws: int, most: float) -> Real:

@@ -265,7 +265,7 @@ class RequirementTask:
     ) -> RequiredLaw | None:
         """Return a law by the models alone that violates the requirements by less than `NEAR`, None without one.
 
-        A sketch tells whether there is one, if its law is far from it.
+        A sketch is enough where its law is far from any.
         """
         # of violations: a whole search hardly finds so much less than a sketch
         far = 0.5
