@@ -24,6 +24,7 @@ import sys
 import time
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -362,17 +363,26 @@ def brief(rng):
 
 
 def record(first, last, seed, path):
-    """Append a line of JSON for each of these rigs against twenty times the evaluations."""
+    """Append a line of JSON for each of these rigs that the file has not, against twenty times the evaluations."""
+    known = [(row["seed"], row["rig"]) for row in rows_of(path)]
     for number in range(first, last):
+        if (seed, number) in known:
+            continue
         found = {"rig": number, "seed": seed} | outcome_of(some_task(np.random.default_rng([seed, number])), 20.0)
-        with open(path, "a") as file:
+        with Path(path).open("a") as file:
             file.write(json.dumps(found, default=float) + "\n")
 
 
+def rows_of(path):
+    """The records of a file, the last of each rig."""
+    lines = Path(path).read_text().splitlines() if Path(path).exists() else []
+    rows = [json.loads(line) for line in lines]
+    return list({(row["seed"], row["rig"]): row for row in rows}.values())
+
+
 def summary(path):
-    """Print the shares of all lines of a file."""
-    with open(path) as file:
-        rows = [json.loads(line) for line in file]
+    """Print the shares of all rigs of a file."""
+    rows = rows_of(path)
     both = [row for row in rows if row["met"] and row["other_met"]]
     alone = [row["rig"] for row in rows if row["met"] and np.isinf(row["other"])]
     lost = [row["rig"] for row in rows if not row["met"] and np.isfinite(row["other"])]

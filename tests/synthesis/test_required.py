@@ -39,5 +39,5 @@ def test_a_law_that_can_only_slow_a_vibration_down_is_no_null_controller():
 @pytest.mark.parametrize("number", thinned([9, 3, 13, 0, 8], 5))
 def test_another_optimiser_finds_no_better_law(number):
     """Of random rigs with the seed 1: the tip of number 13 is not at rest where the first record of a slew ends."""
-    found = compare(np.random.default_rng([1, number]), 1 / 64)
+    found = compare(np.random.default_rng([1, number]), 0.3)
     assert found.outcome == "not beaten", found.words
