@@ -84,7 +84,8 @@ class SlewMeasures:
                     "residual_raw_moment_rms": residuals[1],
                     "peak_input": float(abs(run.torque).max()),
                 }
-            found |= self._figures(run)
+            if self.parts:
+                found |= self._figures(run)
             if settled is not None:
                 found["settling_time_s"] = settled
                 break
