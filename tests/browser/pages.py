@@ -565,6 +565,172 @@ def test_what_the_requirements_forbid_is_shaded_and_the_recommended_gains_are_go
             assert (page.evaluate(SHADE, place) > 0) is is_shaded
 
 
+def place_of(page: Page, chart: str, x: float, y: float) -> tuple[float, float]:
+    """Where a value is on the screen, on the uppermost plot of a chart."""
+    at = page.evaluate("([c, x, y]) => [live.scales[c][0].x.at(x), live.scales[c][0].y.at(y)]", [chart, x, y])
+    box = page.locator(f"#{chart} canvas").bounding_box()
+    assert box is not None
+    return box["x"] + at[0], box["y"] + at[1]
+
+
+def poles_shown(page: Page, chart: str) -> list[complex]:
+    """The poles that a chart draws."""
+    found = page.evaluate("live.now.near" if chart == "poles" else "live.now.z.map(each => each.z)")
+    return [complex(*each[:2]) for each in found]
+
+
+def nearest_off(page: Page, chart: str, x: float, y: float) -> float:
+    """Pixels from a place to the nearest pole that a chart draws."""
+    return min(math.dist((x, y), place_of(page, chart, s.real, s.imag)) for s in poles_shown(page, chart))
+
+
+@pytest.mark.parametrize("chart", ["poles", "zplane"])
+@pytest.mark.parametrize("name", ARMS)
+def test_a_pole_is_dragged_and_the_gains_follow(browser, folder, name, chart):
+    """To where tfarm has it at other gains: it is under the pointer at each step, and the gains become those."""
+    arm, chain = tfarm.load(name), load_chain(name)
+    with live_page(browser, folder, name) as opened:
+        page = opened.page
+        show_chart(page, chart)
+        start, band = page.evaluate("[{...live.law}, live.loop.band]")
+
+        def exact(law: HubFeedback) -> Any:
+            case = Case(arm, law, chain)
+            return stability(case, band).poles.values if chart == "poles" else sampled_verdict(case).full.poles.z
+
+        wanted = HubFeedback(K1=1.1 * start["K1"], K2=0.8 * start["K2"])
+        pole = next(s for s in poles_shown(page, chart) if s.imag > 0.2)
+        target = min(exact(wanted), key=lambda s: abs(s - pole))
+        ends = np.array([place_of(page, chart, s.real, s.imag) for s in (pole, target)])
+        assert math.dist(*ends) > 0.5
+        page.mouse.move(*ends[0])
+        page.mouse.down()
+        for share in (0.25, 0.5, 0.75, 1.0):
+            count = page.evaluate("live.moves.length")
+            to = (1 - share) * ends[0] + share * ends[1]
+            page.mouse.move(*to)
+            page.wait_for_function("n => live.moves.length > n", arg=count)
+            assert page.locator("#range").is_hidden()
+            assert nearest_off(page, chart, *to) < 1.0
+        page.mouse.up()
+        law = HubFeedback(**page.evaluate("live.law"))
+        assert float(page.locator("#K1").input_value()) == law.K1
+        dragged = min(poles_shown(page, chart), key=lambda s: math.dist(to, place_of(page, chart, s.real, s.imag)))
+        assert abs(exact(law) - dragged).min() < 1e-3 * abs(dragged)
+        # the pointer has whole pixels
+        if math.dist(*ends) > 20.0:
+            assert law.by_name == pytest.approx(wanted.by_name, rel=0.05)
+
+
+def test_a_real_pole_goes_along_the_locus_and_a_pole_of_a_law_with_its_gains(browser, folder, tmp_path):
+    """The gain of the locus moves it alone; both first gains of a law of rational parts move a pair."""
+    (tmp_path / "law").mkdir()
+    name, law = LAWS[0]
+    save_live(ArmReport(tfarm.load(name), load_chain(name), (GivenLaw(law),)), tmp_path / "law")
+    write_assets(tmp_path / ASSETS)
+    for file, is_real in ((folder / ARMS[0] / "live.html", True), (tmp_path / "law" / "live.html", False)):
+        with Opened(browser, file) as opened:
+            page = opened.page
+            show_chart(page, "poles")
+            pole = next(s for s in poles_shown(page, "poles") if (s.imag == 0) is is_real and s.real < 0)
+            start, vary = page.evaluate("[{...live.law}, document.getElementById('vary').value]")
+            x, y = place_of(page, "poles", pole.real, pole.imag)
+            to = x - 5, y - 3 * (not is_real)
+            page.mouse.move(x, y - 2 * is_real)
+            page.mouse.down()
+            page.mouse.move(*to)
+            page.wait_for_function("start => Object.keys(start).some(k => live.now.law[k] !== start[k])", arg=start)
+            page.wait_for_timeout(200)
+            assert nearest_off(page, "poles", *to) < 1.0
+            page.mouse.up()
+            changed = {key for key, value in page.evaluate("live.law").items() if value != start[key]}
+            assert changed == ({vary} if is_real else set(list(start)[:2]))
+
+
+def test_the_curve_of_the_gain_is_dragged_and_all_gains_follow(browser, folder):
+    """It is under the pointer, by the loop of the library; beyond the range of one gain all of them stop."""
+    with live_page(browser, folder) as opened:
+        page = opened.page
+        show_chart(page, "bode")
+        w, size = page.evaluate("(() => { const r = live.now.curve().find(r => r.w > 3); return [r.w, r.dB]; })()")
+        start = page.evaluate("({...live.law})")
+        x, y = place_of(page, "bode", w, size)
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x, y - 20)
+        page.wait_for_function("K1 => live.now.law.K1 !== K1", arg=start["K1"])
+        page.wait_for_timeout(100)
+        law = HubFeedback(**page.evaluate("live.law"))
+        assert law.K1 / start["K1"] == pytest.approx(law.K2 / start["K2"], rel=1e-6)
+        drive, fed_back = ContinuousLoop(Case(tfarm.load(ARMS[0]), law)).parts(np.array([1j * w]))
+        here = place_of(page, "bode", w, 20 * math.log10(abs(fed_back[0] / drive[0])))
+        assert here == pytest.approx((x, y - 20), abs=1.0)
+        page.mouse.move(x, y - 2000)
+        page.wait_for_function("K1 => live.now.law.K1 > 1.01 * K1", arg=law.K1)
+        stopped = page.evaluate("({...live.law})")
+        assert stopped["K2"] == pytest.approx(live_data(page)["axes"]["K2"]["high"])
+        assert stopped["K1"] / start["K1"] == pytest.approx(stopped["K2"] / start["K2"], rel=1e-6)
+        page.mouse.up()
+
+
+def test_keys_move_a_pole_and_the_gain(browser, folder):
+    with live_page(browser, folder) as opened:
+        page = opened.page
+        start = page.evaluate("({...live.law})")
+        page.locator("#bode").focus()
+        page.keyboard.press("ArrowUp")
+        page.wait_for_function("K1 => live.now.law.K1 > K1", arg=start["K1"])
+        raised = page.evaluate("({...live.law})")
+        for gain in ("K1", "K2"):
+            assert raised[gain] / start[gain] == pytest.approx(10 ** (0.5 / 20), rel=1e-6)
+        page.locator("#poles").focus()
+        before = poles_shown(page, "poles")[1]
+        for key in ("n", "n", "ArrowLeft"):
+            page.keyboard.press(key)
+            page.wait_for_timeout(100)
+        after = min(poles_shown(page, "poles"), key=lambda s: abs(s - before))
+        place, moved = (np.array(place_of(page, "poles", s.real, s.imag)) for s in (before, after))
+        assert moved - place == pytest.approx([-5.0, 0.0], abs=0.5)
+
+
+def test_a_finger_drags_a_pole_and_does_not_scroll_there(browser, folder):
+    with live_page(browser, folder, width=400, height=800) as opened:
+        page = opened.page
+        show_chart(page, "poles")
+        pole = poles_shown(page, "poles")[1]
+        x, y = place_of(page, "poles", pole.real, pole.imag)
+        start, top = page.evaluate("[{...live.law}, scrollY]")
+        touch = partial(page.context.new_cdp_session(page).send, "Input.dispatchTouchEvent")
+        touch({"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
+        for step in range(1, 6):
+            touch({"type": "touchMove", "touchPoints": [{"x": x - 2 * step, "y": y - 5 * step}]})
+            page.wait_for_timeout(60)
+        touch({"type": "touchEnd", "touchPoints": []})
+        page.wait_for_timeout(100)
+        # words of another length may move it, a finger by ten times that
+        assert abs(page.evaluate("scrollY") - top) < 5
+        assert nearest_off(page, "poles", x - 10, y - 25) < 1.0
+        assert page.evaluate("live.law.K2") != start["K2"]
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_the_region_of_the_grade_good_ends_where_the_cards_do(browser, folder, name):
+    """At 0.2 % of an interval inside each of its ends both exact loops are good, and as far outside one is not."""
+    arm, chain = tfarm.load(name), load_chain(name)
+    with live_page(browser, folder, name) as opened:
+        page = opened.page
+        page.wait_for_function("() => live.rested === live.now.law", timeout=90_000)
+        rows, axis = page.evaluate("[live.now.good, live.loop.axes.K2]")
+        assert len(rows) > 3
+        for row in np.random.default_rng(7).permutation(rows)[:6]:
+            step = 2e-3 * (row["high"] - row["low"])
+            for end, way in (("low", 1.0), ("high", -1.0)):
+                for is_good in (True, False) if axis["low"] < row[end] < axis["high"] else ():
+                    law = HubFeedback(K1=row["K1"], K2=row[end] + way * (step if is_good else -step))
+                    card = tfarm.result_card(arm, law, chain)
+                    assert ({card.continuous.grade, card.sampled.grade} == {"good"}) is is_good, law
+
+
 def test_keys_undo_and_link_reach_every_state_and_the_file_is_a_law(browser, folder, tmp_path):
     file = folder / ARMS[0] / "live.html"
     with Opened(browser, file, 1280) as opened:

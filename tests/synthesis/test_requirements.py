@@ -58,7 +58,7 @@ def test_a_list_a_table_and_the_word_good_say_the_same():
         ("tip.final_value<=1", "SIGNAL.rise_time_s, SIGNAL.overshoot, SIGNAL.steady_state_error"),
         ("bandwidth<=3", "bandwidth is limited by >="),
         ("hub.peak<=3%", "peak, hub is in rad"),
-        ("pm>=45", 'did you mean "PM"? known are: GM, PM, delay,'),
+        ("pm>=45", 'did you mean "PM"? known are: GM, gain_reduction, PM,'),
         ("damping>=2", "at most 1, such as 2% or 0.02"),
         ("PM>=-20", "at least 0, at most 360"),
         ("delay>=-1", "at least 0, at most 40"),

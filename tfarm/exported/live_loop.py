@@ -47,7 +47,6 @@ from tfarm.loop.windows import windows_of
 from tfarm.response import transfer
 from tfarm.spectrum.gains import angle_unit, default_gains
 from tfarm.synthesis.design import recommended_gains
-from tfarm.synthesis.good_region import GoodRegion, good_region
 from tfarm.synthesis.stability_map import BEYOND_PICTURE, sampled_region
 
 CONSUMER = Consumer(
@@ -109,7 +108,6 @@ def _of_gains(case: Case, start: HubFeedback) -> LiveNumbers:
     across = np.unique(np.r_[rate_columns(arm, x, LIVE_COLUMNS), x.high])
     continuous = gain_map(arm, across, np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE]))
     sampled = sampled_region(arm, x, y, case.chain)
-    good = good_region(arm, x, y, case.chain)
     chosen, _ = recommended_gains(arm, case.chain)
     return {
         **_of_any_law(case.under(reference), corners),
@@ -125,7 +123,6 @@ def _of_gains(case: Case, start: HubFeedback) -> LiveNumbers:
         "reference": {name: reference[name] for name in PLANE},
         "continuous": _areas(continuous),
         "sampled_map": None if sampled is None else _sampled_map(sampled),
-        "good": None if good is None else _areas(good),
         "recommended": chosen.law.by_name if chosen is not None and chosen.is_met else None,
         "sampled_loop": None if sampled is None else sampled_numbers(sampled.loop),
         "slew": slew_numbers(case),
@@ -165,7 +162,7 @@ def _of_parts(case: Case) -> LiveNumbers:
         "start": gains,
         "reference": gains,
         **dict.fromkeys(
-            ("continuous", "sampled_map", "good", "recommended", "slew", "lyapunov", "default", "outputs")
+            ("continuous", "sampled_map", "recommended", "slew", "lyapunov", "default", "outputs")
         ),
         "sampled_loop": _in_page(case, unit),
     }
@@ -280,7 +277,7 @@ def _stable_moments(arm: Arm) -> list[float | None]:
     return [end if found.end(end) == "edge" else None for end in found.around or (-math.inf, math.inf)]
 
 
-def _areas(plane: Plane | GainMap | GoodRegion) -> list[dict[str, float]]:
+def _areas(plane: Plane | GainMap) -> list[dict[str, float]]:
     """Return rows across, low, high of the parts of the stable region, each part with its number."""
     rows = []
     for number, piece in enumerate(pieces(plane.x, plane.stable_intervals)):

@@ -41,21 +41,27 @@ function zerosOn({ w, D, N, at }, f) {
   return found;
 }
 
-// The least value of f and where; its lowest dips refined by the golden section
+// The least value of f between a, where it is finite, and b, by the golden section
+function lowestBetween(f, a, b, rounds = 34) {
+  const share = (Math.sqrt(5) - 1) / 2;
+  let c = b - share * (b - a), d = a + share * (b - a), fc = f(c), fd = f(d);
+  for (let k = 0; k < rounds; k++) {
+    if (fc <= fd) { b = d; d = c; fd = fc; c = b - share * (b - a); fc = f(c); }
+    else { a = c; c = d; fc = fd; d = a + share * (b - a); fd = f(d); }
+  }
+  return fc < fd ? { value: fc, at: c } : { value: fd, at: d };
+}
+// The least value of f and where; its lowest dips are refined
 function lowestOn({ w, D, N, at }, f) {
-  const values = Float64Array.from(w, (_, i) => f(D[2 * i], D[2 * i + 1], N[2 * i], N[2 * i + 1])), dips = [], share = (Math.sqrt(5) - 1) / 2;
+  const values = Float64Array.from(w, (_, i) => f(D[2 * i], D[2 * i + 1], N[2 * i], N[2 * i + 1])), dips = [];
   let best = { value: Infinity, at: 0 };
   values.forEach((value, i) => {
     if (value < best.value) best = { value, at: w[i] };
     if (i && i < w.length - 1 && value <= values[i - 1] && value <= values[i + 1]) dips.push(i);
   });
   for (const i of dips.sort((a, b) => values[a] - values[b]).slice(0, LOWEST_DIPS)) {
-    let a = w[i - 1], b = w[i + 1], c = b - share * (b - a), d = a + share * (b - a), fc = f(...at(c)), fd = f(...at(d));
-    for (let k = 0; k < 34; k++) {
-      if (fc < fd) { b = d; d = c; fd = fc; c = b - share * (b - a); fc = f(...at(c)); }
-      else { a = c; c = d; fc = fd; d = a + share * (b - a); fd = f(...at(d)); }
-    }
-    if (Math.min(fc, fd) < best.value) best = { value: Math.min(fc, fd), at: fc < fd ? c : d };
+    const found = lowestBetween(q => f(...at(q)), w[i - 1], w[i + 1]);
+    if (found.value < best.value) best = found;
   }
   return best;
 }
@@ -111,7 +117,7 @@ class LiveLoop {
     const bytes = Uint8Array.from(atob(data.samples), c => c.charCodeAt(0));
     this.values = new Float64Array(bytes.buffer); // panel, part, point, re and im
     this.count_of_parts = this.values.length / (2 * POINTS * this.low.length);
-    this.units_of_law = this.names.map(one => Object.fromEntries(this.names.map(name => [name, +(name === one)])));
+    this.units_of_law = this.names.map(one => this.unit(one));
     const base = this.grid().map(w => this.at(w)), units = this.units_of_law;
     const all = (part, law) => Float64Array.from(base.flatMap(point => this.parts(point, law)[part]));
     this.base = { w: Float64Array.from(base, point => point.w), D: all(0, units[0]), rows: units.map(unit => all(1, unit)) };
@@ -119,6 +125,9 @@ class LiveLoop {
     this.moments = [data.moments[0] ?? -Infinity, data.moments[1] ?? Infinity];
   }
 
+  unit(one) {
+    return Object.fromEntries(this.names.map(name => [name, +(name === one)]));
+  }
   sample(panel, part, j) {
     const i = 2 * ((panel * this.count_of_parts + part) * POINTS + j);
     return [this.values[i], this.values[i + 1]];
@@ -126,9 +135,7 @@ class LiveLoop {
 
   // The parts at a real frequency w [rad/s], by the barycentric formula: d, theta and m, or under a law d and what each of its factors adds
   at(w) {
-    let p = 0;
-    while (p < this.low.length - 1 && w > this.high[p]) p += 1;
-    const x = (2 * w - this.low[p] - this.high[p]) / (this.high[p] - this.low[p]), v = this.values;
+    const p = this.panelOf(w), x = (2 * w - this.low[p] - this.high[p]) / (this.high[p] - this.low[p]), v = this.values;
     let weights = 0, i = 2 * this.count_of_parts * p * POINTS;
     for (let j = 0; j < POINTS; j++) weights += WEIGHTS[j] = C[j] / (x - X[j] || 1e-300);
     const values = [];
@@ -138,6 +145,11 @@ class LiveLoop {
       values.push([re / weights, im / weights]);
     }
     return { w, values };
+  }
+
+  panelOf(w) {
+    const p = this.high.findIndex(high => w <= high);
+    return p < 0 ? this.high.length - 1 : p;
   }
 
   // drive s^n d and the sum of each number of the law times its row, a part times a power of s, at s = i w
@@ -306,11 +318,26 @@ class LiveLoop {
 
   // The two numbers of the map with poles at +- i w: the D-decomposition curve at these others
   boundary(w, law) {
-    const point = this.at(w);
-    const [across, up] = this.plane, cross = (a, b) => a[1] * b[0] - a[0] * b[1], [D, N] = this.parts(point, { ...law, [across]: 0, [up]: 0 }), P = add(D, N);
-    const [a, b] = this.plane.map(name => this.parts(point, this.units_of_law[this.names.indexOf(name)])[1]), det = cross(a, b);
-    return { [across]: -cross(P, b) / det, [up]: cross(P, a) / det, w };
+    const point = this.at(w), [D, N] = this.parts(point, { ...law, ...Object.fromEntries(this.plane.map(name => [name, 0])) });
+    return { ...gainsOf(add(D, N), this.plane.map(name => [name, this.parts(point, this.units_of_law[this.names.indexOf(name)])[1]])), w };
   }
+
+  // The characteristic function at any s near the axis, from its series: D, and by name what each number of the law adds
+  terms([re, im]) {
+    const p = this.panelOf(im), half = (this.high[p] - this.low[p]) / 2, z = [(im - this.low[p]) / half - 1, clip(-re / half, -1, 1)];
+    const [rest, ...rows] = this.seriesOf(p, 0).map(f => {
+      let b = [0, 0], c = [0, 0];
+      for (let k = POINTS - 1; k > 0; k--) [b, c] = [add([f[2 * k], f[2 * k + 1]], minus(times(2, mul(z, b)), c)), b];
+      return add([f[0], f[1]], minus(mul(z, b), c));
+    });
+    return { rest, ...Object.fromEntries(this.names.map((name, r) => [name, rows[r]])) };
+  }
+}
+
+// The numbers k with P + sum k A = 0, by name from [[name, A], ...]: two of a complex equation, and of one number the nearest
+function gainsOf(P, [[one, a], [two, b] = []]) {
+  const cross = ([p, q], [r, s]) => q * r - p * s;
+  return b ? { [one]: -cross(P, b) / cross(a, b), [two]: cross(P, a) / cross(a, b) } : { [one]: -(P[0] * a[0] + P[1] * a[1]) / (a[0] * a[0] + a[1] * a[1]) };
 }
 
 // The zeros of a Chebyshev series, cut where it is rounding, by Aberth's iteration (1973)

@@ -16,23 +16,29 @@
 
   // ---------------------------------------------------------------- numbers of these gains
 
-  let now = null; // of the gains last moved to
+  let now = null, view = null; // of the gains last moved to; those whose axes are held in a drag
   const slowest = poles => Math.max(...poles.map(s => s[0])), constant = x => x < 0 ? -1 / x : Infinity; // of a stable loop
   const ratio = poles => Math.min(...poles.filter(s => s[1] > 0).map(s => -s[0] / size(s)));
   const word = growths => growths.length && Math.max(...growths) > 0 ? "unstable" : Math.max(...growths) < 0 ? "stable" : "marginal";
-  function numbers(gains) {
-    const law = { ...gains }, is_known = loop.kind === "reactive" && loop.verdict(law, [])[0] === "stable"; // without poles: those of the chart are enough
+  function continuousNumbers(law) {
+    const is_known = loop.kind === "reactive" && loop.verdict(law, [])[0] === "stable"; // without poles: those of the chart are enough
     const poles = loop.poles(law, now?.poles, Infinity, is_known ? 12 : Infinity), [verdict, why] = loop.verdict(law, poles);
     const seen = damped || loop, own = damped ? damped.poles(law, now?.own) : poles, curve = seen.dense(own, law);
-    const z = discrete && discrete.poles(law, now?.z), stable = verdict.startsWith("stable"), grows = verdict === "unstable" || poles.some(s => s[0] > 1e-9 * size(s)), near = poles.slice(0, +state.shown);
+    const stable = verdict.startsWith("stable"), grows = verdict === "unstable" || poles.some(s => s[0] > 1e-9 * size(s));
     const is_seen = damped ? !grows && damped.verdict(law, own)[0].startsWith("stable") : stable;
-    const margins = is_seen ? seen.margins(law, curve, false) : null, shownPoles = damped && !grows ? own : poles;
+    return { poles, own, verdict, why, stable, grows, curve, margins: is_seen ? seen.margins(law, curve, false) : null };
+  }
+  function frameOf(near) {
     const top = 1.08 * Math.max(...near.map(s => s[1]), 1), left = 1.15 * Math.min(...near.map(s => s[0]), -1e-4 * top), right = Math.max(-0.05 * left, 1.3 * Math.max(...near.map(s => s[0])));
-    const from = Math.min(loop.places[0] / 50, ...(margins ? margins.crossed.map(row => row.w / 3) : [])), drawn = {};
+    return { x: [left, right], y: [0, top] };
+  }
+  function numbers(gains) {
+    const law = { ...gains }, found = continuousNumbers(law), { poles, own, grows, margins, curve } = found, near = poles.slice(0, +state.shown), shownPoles = damped && !grows ? own : poles;
+    const from = view?.from || Math.min(loop.places[0] / 50, ...(margins ? margins.crossed.map(row => row.w / 3) : [])), drawn = {};
     return {
-      law, poles, own, verdict, why, stable, grows, margins, near, frame: { x: [left, right], y: [0, top] }, ...sampledNumbers(law, z),
+      ...found, law, near, frame: view?.frame || frameOf(near), ...sampledNumbers(law, discrete && discrete.poles(law, now?.z)),
       ratio: ratio(shownPoles), constant: constant(slowest(shownPoles)), run: slew && slew.run(law), from, curve: () => drawn[sharp()] ||= curveOf(curve, ...pixels(), from),
-      ...(now && names.every(name => name === across || name === up || now.law[name] === law[name]) ? { areas: now.areas, edge: now.edge } : { areas: areas(law), edge: null }),
+      ...(now && names.every(name => name === across || name === up || now.law[name] === law[name]) ? { areas: now.areas, edge: now.edge, good: now.good } : { areas: areas(law), edge: null, good: null }),
     };
   }
   function sampledNumbers(law, z) {
@@ -51,11 +57,23 @@
 
   const grade = (size, [good, low]) => { const way = good > low ? 1 : -1; return way * size >= way * good ? "good" : way * size >= way * low ? "low" : "poor"; };
   const infinite = x => Number.isFinite(x) ? general(x, 4) : "no limit", decibels = factor => factor > 1e-9 && factor < 1e9 ? Math.abs(dB(factor)) : Infinity;
-  function card(of, id, kind, margins, period) {
-    const { limits } = data, cells = margins ? {
+  // The margins of a loop with their limits, as the card has them
+  function cellsOf(margins) {
+    const { limits, period } = data;
+    return margins ? {
       up: [decibels(margins.gain[1]), limits.gain], down: [decibels(margins.gain[0]), limits.gain], phase: [Math.abs(margins.phase.value), limits.phase],
       delay: [1e3 * margins.delay.value, limits.periods.map(x => 1e3 * x * period)], peak: [margins.peak_sensitivity.value, limits.peak],
-    } : {}, grades = {};
+    } : {};
+  }
+  // The delay of the sampled loop by its poles: `margins` follows crossings, of which a delay may make new ones
+  function isGood(law) {
+    const is = (margins, but) => !!margins && Object.entries(cellsOf(margins)).every(([name, [value, limit]]) => name === but || grade(value, limit) === "good");
+    if (!is(continuousNumbers(law).margins)) return false;
+    const z = discrete.poles(law);
+    return is(sampledNumbers(law, z).zmargins, "delay") && (dampedZ || discrete).isStableLate(law, data.limits.periods[0]);
+  }
+  function card(of, id, kind, margins) {
+    const cells = cellsOf(margins), grades = {};
     for (const name of Object.keys(data.margin_names)) {
       const [value, limit] = cells[name] || [], found = grades[name] = limit ? grade(value, limit) : "";
       const is_bound = of === "z" && name === "delay" && value > 1e3 * data.longest_delay; // where tfarm searches no further
@@ -69,9 +87,9 @@
     text(`${of}-limits`, worst && worst !== "good" ? `${worst}: ${own.map(name => data.margin_names[name]).join(", ")}` : "");
   }
   function show() {
-    const { law, verdict, why, margins, zmargins, zword } = now, period = data.period;
-    card("s", "verdict", now.grows ? "unstable" : now.stable ? "stable" : "marginal", margins, period);
-    card("z", "sampled", zword, zmargins, period);
+    const { law, verdict, why, margins, zmargins, zword } = now;
+    card("s", "verdict", now.grows ? "unstable" : now.stable ? "stable" : "marginal", margins);
+    card("z", "sampled", zword, zmargins);
     text("why", `${why}.`);
     text("s-ratio", Number.isFinite(now.ratio) ? general(100 * now.ratio, 4) : "-");
     text("z-ratio", Number.isFinite(now.zratio) ? general(100 * now.zratio, 4) : "-");
@@ -145,6 +163,7 @@
   const plane = up && { x: gainAxis(across), y: gainAxis(up) }, limited = (margins, of) => margins ? [margins.phase, margins.peak_sensitivity][of] : null;
   const kindOf = x => x < 0 ? "stable" : x > 0 ? "unstable" : "marginal", shapes = { stable: CROSS, marginal: BOX, unstable: RING };
   const polePoints = (list, x, y, sign) => ({ points: list, x, y, shape: row => shapes[kindOf(sign(row))], colour: row => colours[kindOf(sign(row))] });
+  const chosenPole = name => ({ points: chosen?.name === name ? [chosen.at] : [], x: 0, y: 1, shape: RING, radius: 9, colour: colours.link });
   function phaseMargin() {
     const at = limited(now.margins, 0);
     return at && at.at ? { w: at.at, low: -180, high: at.value - 180, colour: colours[grade(Math.abs(at.value), data.limits.phase)] } : null;
@@ -161,7 +180,7 @@
   const charts = {
     map: () => [{ ...plane, marks: [
       { area: now.areas || [], x: across, low: "low", high: "high", by: "part", fill: colours.stable },
-      { area: now.law.Kp ? [] : data.good || [], x: across, low: "low", high: "high", by: "part", fill: colours.good },
+      { area: now.good || [], x: across, low: "low", high: "high", by: "part", fill: colours.good },
       { area: now.law.Kp ? [] : sampledAreas, x: "K1", low: "low", high: "high", by: "part", hatch: colours.stable, dash: [5, 3] },
       { line: now.edge || [], x: across, y: up, by: "piece", colour: colours.stable, width: 1 }, { line: proven, x: "K1", y: "K2", colour: colours.ink, dash: [2, 3] },
       { rule: now.law[across], along: "x" }, { rule: now.law[up] }, { points: [now.law], x: across, y: up, shape: DOT, colour: colours.ink },
@@ -171,7 +190,7 @@
         { zone: undampedIn(now.frame, +state.ratio / 100), x: "re", y: "im", fill: colours.poor },
         { line: rays(now.frame), x: "re", y: "im", by: "ratio", colour: colours.grey, dash: [4, 3], width: 0.8 }, { words: rays(now.frame).filter(row => row.end), x: "re", y: "im", text: "ratio", colour: colours.grey },
         { rule: 0, along: "x" }, { line: now.locus || [], x: "re", y: "im", by: "piece", colour: colours.link, width: 1 }, { points: pointed.poles ? [pointed.poles] : [], x: "re", y: "im", shape: DOT, colour: colours.link },
-        polePoints(now.near, 0, 1, s => s[0]),
+        polePoints(now.near, 0, 1, s => s[0]), chosenPole("poles"),
       ],
     }],
     zplane: () => {
@@ -180,7 +199,7 @@
         { zone: undampedOutside(wide, high, +state.ratio / 100), x: "re", y: "im", fill: colours.poor },
         { line: spirals(), x: "re", y: "im", by: "ratio", colour: colours.grey, dash: [4, 3], width: 0.8 }, { line: circle(0, 1), x: "x", y: "y", colour: colours.grey },
         { line: now.discs || [], x: "re", y: "im", by: "piece", colour: colours.link, width: 1 }, { points: pointed.zplane ? [pointed.zplane] : [], x: "re", y: "im", shape: DOT, colour: colours.link },
-        polePoints((now.z || []).map(({ z, growth }) => ({ re: z[0], im: z[1], growth })), "re", "im", row => row.growth),
+        polePoints((now.z || []).map(({ z, growth }) => ({ re: z[0], im: z[1], growth })), "re", "im", row => row.growth), chosenPole("zplane"),
       ] }];
     },
     bode: () => {
@@ -268,8 +287,10 @@
     $("range").hidden = !beyond.length;
     text("range", beyond.join(" "));
   }
-  function set(changes) {
+  function set(changes, pole = null, is_held = !!pole) { // and of a move of a pole that one; what is dragged is held by the axes as they are
     if (Object.keys(changes).length) take(changes);
+    view = is_held ? now : null;
+    chosen = pole;
     if (waiting) return;
     waiting = true;
     requestAnimationFrame(() => { waiting = false; move(); });
@@ -299,7 +320,7 @@
     keep();
     chord = PRECISE;
     drawAll(true);
-    const work = [...(up ? [["map", "edge", onAxis], ["map", "areas", inPlane]] : []), state.plane === "poles" ? ["poles", "locus", inS] : ["zplane", "discs", inZ]];
+    const work = [...(up ? [["map", "edge", onAxis], ["map", "areas", inPlane]] : []), state.plane === "poles" ? ["poles", "locus", inS] : ["zplane", "discs", inZ], ...(up && discrete ? [["map", "good", inGood]] : [])];
     for (const [name, key, make] of work) {
       const found = of[key] || await inSlices(make(), of);
       if (!found) return;
@@ -315,7 +336,24 @@
     return loop.kind === "reactive" ? [] : edgeOf(w => loop.boundary(w, now.law), [...loop.base.w], data.plane, data.axes);
   }
   function* inPlane() {
-    return area(yield* regionOf(loop, now.law, data.axes), "c");
+    const { law } = now, { low, high } = data.axes[up];
+    return area(yield* regionOf(function* (K) { return loop.intervals({ ...law, [across]: K }, low, high); }, data.plane, data.axes), "c");
+  }
+  // The gains of the grade good: their ends are those of a requirement, exact; between two of them the card decides, which alone has delays within a sample
+  let lines = null;
+  function* inGood() {
+    const { law } = now, { low, high } = data.axes[up], { limits, period } = data, [delay] = limits.periods, is_reactive = loop.kind === "reactive";
+    if (!lines) {
+      const made = [];
+      for (const each of [damped || loop, dampedZ || discrete, (dampedZ || discrete).later(delay), ...(damped ? [discrete, ...(is_reactive ? [] : [loop])] : [])]) made.push(yield* linesOf(each));
+      lines = made;
+    }
+    const { rules, factors } = exclusions(limits, delay * period), moments = is_reactive ? loop.moments.map(k => exactly(k, k)) : [];
+    return area(yield* regionOf(function* (K) {
+      const here = { ...law, [across]: K }, [s, z, ...others] = lines.map(each => columnOf(each, here, up));
+      const excluded = [s, z].flatMap((column, i) => [...rules(i).flatMap(rule => excludedBy(rule, column, [low, high])), ...excludedStill(factors, column.at(i * Math.PI))]);
+      return yield* goodParts(leftOf([...excluded, ...others.flatMap(edgesOf), ...moments], low, high), k => isGood({ ...here, [up]: k }));
+    }, data.plane, data.axes, 0.02), "g");
   }
   function inS() {
     const [gain, law] = along(state.vary), { frame } = now;
@@ -385,16 +423,71 @@
 
   // ---------------------------------------------------------------- pointing and keys
 
+  const NEAR = 16; // pixels from the pointer to what it takes
+  let drag = null, chosen = null; // what follows the pointer; the pole that moves, {name of its chart, at}
   function pointing(name, follow) {
     canvasOf(name).addEventListener("pointermove", event => { const box = canvasOf(name).getBoundingClientRect(); follow(event.clientX - box.left, event.clientY - box.top, event); });
   }
-  let dragged = false;
-  const toGains = (x, y) => { const [plot] = scales.map; set({ [across]: +plot.x.back(x).toPrecision(4), [up]: +plot.y.back(y).toPrecision(4) }); };
-  if (up) {
-    canvasOf("map").addEventListener("pointerdown", event => { dragged = true; canvasOf("map").setPointerCapture(event.pointerId); toGains(event.offsetX, event.offsetY); });
-    pointing("map", (x, y) => { if (dragged) toGains(x, y); });
+  // `taken(x, y)` is what follows a pointer that goes down there, or null
+  function draggable(name, taken) {
+    const canvas = canvasOf(name);
+    canvas.addEventListener("pointerdown", event => {
+      if (!(drag = taken(event.offsetX, event.offsetY))) return;
+      canvas.setPointerCapture(event.pointerId);
+      drag(event.offsetX, event.offsetY);
+    });
+    canvas.addEventListener("touchstart", event => { if (drag) event.preventDefault(); }, { passive: false }); // else a finger scrolls
+    pointing(name, (x, y) => { if (drag) drag(x, y); else canvas.classList.toggle("taken", !!taken(x, y)); });
   }
-  addEventListener("pointerup", () => { dragged = false; });
+  for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => { drag = null; });
+  if (up) draggable("map", () => (x, y) => { const [plot] = scales.map; set({ [across]: +plot.x.back(x).toPrecision(4), [up]: +plot.y.back(y).toPrecision(4) }); });
+
+  // A pole goes to `at` with both gains of the map, or on the real axis with that of the locus; exact, as the loop is linear in its gains
+  const polesOf = name => name === "poles" ? now.near : (now.z || []).map(({ z }) => z).filter(z => size(z) > FAINT);
+  function movePole(name, at) {
+    const { rest, ...terms } = (name === "poles" ? loop : discrete).terms(at), free = up && at[1] ? [across, up] : [state.vary];
+    const P = names.filter(each => !free.includes(each)).reduce((sum, each) => add(sum, times(law[each], terms[each])), rest), found = Object.entries(gainsOf(P, free.map(each => [each, terms[each]])));
+    if (!found.every(([, gain]) => Number.isFinite(gain))) return;
+    set(Object.fromEntries(found.map(([each, gain]) => [each, +gain.toPrecision(7)])), { name, at });
+    text("poles-reading", `${complex({ re: at[0], im: at[1] })}: ${free.map(each => `${each} = ${general(law[each], 5)}`).join(", ")}`);
+  }
+  const POLE_KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] };
+  for (const name of discrete ? ["poles", "zplane"] : ["poles"]) {
+    const onAxis = ([x, y], other) => [x, other[1] ? y : 0];
+    draggable(name, (x, y) => {
+      const [plot] = scales[name], pixel = Math.abs(plot.y.back(1) - plot.y.back(0)), off = ([re, im]) => Math.hypot(plot.x.at(re) - x, plot.y.at(im) - y);
+      const pole = polesOf(name).reduce((best, each) => off(each) < off(best) ? each : best, [Infinity, 0]);
+      return off(pole) > NEAR ? null : (x, y) => movePole(name, onAxis([plot.x.back(x), name === "poles" ? Math.max(plot.y.back(y), pixel) : plot.y.back(y)], pole));
+    });
+    $(name).addEventListener("keydown", event => {
+      const poles = polesOf(name), i = chosen?.name === name ? poles.reduce((best, each, k) => size(minus(each, chosen.at)) < size(minus(poles[best], chosen.at)) ? k : best, 0) : -1, way = POLE_KEYS[event.key];
+      if (!(way || event.key === "n") || !poles.length) return;
+      event.preventDefault();
+      if (event.key === "n" || i < 0) { set({}, { name, at: poles[(i + 1) % poles.length] }); return; }
+      const [{ x, y }] = scales[name], pixels = event.shiftKey ? 1 : 5, [re, im] = poles[i];
+      movePole(name, onAxis([x.back(x.at(re) + pixels * way[0]), y.back(y.at(im) - pixels * way[1])], poles[i]));
+    });
+  }
+  // All gains times a factor, as far as each of them has its range
+  function scale(from, factor) {
+    const ends = names.filter(name => from[name]).map(name => [data.axes[name].low / from[name], data.axes[name].high / from[name]].sort((a, b) => a - b));
+    const by = clip(factor, Math.max(0, ...ends.map(([low]) => low)), Math.min(...ends.map(([, high]) => high)));
+    set(Object.fromEntries(names.map(name => [name, +(from[name] * by).toPrecision(7)])), null, !!drag);
+  }
+  draggable("bode", (x, y) => {
+    const [plot] = scales.bode, from = { ...law }, off = (a, b) => {
+      const [u, v] = [a, b].map(row => [plot.x.at(row.w) - x, plot.y.at(row.dB) - y]), d = minus(v, u), share = clip(-(u[0] * d[0] + u[1] * d[1]) / (d[0] * d[0] + d[1] * d[1] || 1), 0, 1);
+      return size(add(u, times(share, d)));
+    };
+    const is_near = [own(), sampledCurve()].some(rows => rows.some((row, i) => i && off(rows[i - 1], row) < NEAR));
+    return y < plot.y.from && is_near ? (_, to) => scale(from, 10 ** ((plot.y.back(to) - plot.y.back(y)) / 20)) : null;
+  });
+  $("bode").addEventListener("keydown", event => {
+    const way = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+    if (!way) return;
+    event.preventDefault();
+    scale({ ...law }, 10 ** (way * (event.shiftKey ? 0.05 : 0.5) / 20));
+  });
   $("map")?.addEventListener("keydown", event => {
     const ways = { ArrowLeft: [across, -1], ArrowRight: [across, 1], ArrowDown: [up, -1], ArrowUp: [up, 1] }, way = ways[event.key];
     if (!way) return;
@@ -408,6 +501,7 @@
   });
   // What the curves are under the pointer, in words
   pointing("bode", x => {
+    if (drag) return;
     const w = scales.bode[0].x.back(x), curve = now.curve(), row = curve.find(each => each.w >= w);
     if (!row) return;
     pointed.bode = row;
@@ -420,15 +514,16 @@
   // The gain at the place of a locus that is nearest to the pointer
   function readLocus(name, key, words) {
     pointing(name, (x, y) => {
+      if (drag) return;
       const [{ x: across, y: up }] = scales[name];
       let best = null, gap = 30 ** 2;
       for (const row of now[key] || []) { const far = (across.at(row.re) - x) ** 2 + (up.at(row.im) - y) ** 2; if (far < gap) [best, gap] = [row, far]; }
-      text("poles-reading", best ? `${state.vary} = ${general(best.gain, 5)}: ${words(best)}` : "Point at a locus: its gain there.");
+      text("poles-reading", best ? `${state.vary} = ${general(best.gain, 5)}: ${words(best)}` : READ);
       pointed[name] = best;
       draw(name);
     });
   }
-  const complex = ({ re, im }) => `${general(re, 5)} ${im < 0 ? "−" : "+"} ${general(Math.abs(im), 5)}i`;
+  const READ = $("poles-reading").textContent, complex = ({ re, im }) => `${general(re, 5)} ${im < 0 ? "−" : "+"} ${general(Math.abs(im), 5)}i`;
   readLocus("poles", "locus", row => `s = ${complex(row)} 1/s, ${general(hertz(row.im), 4)} Hz${row.im ? `, damping ratio ${dampingRatio([row.re, row.im])}` : ""}`);
   readLocus("zplane", "discs", row => `z = ${complex(row)}, |z| = ${general(size([row.re, row.im]), 5)}`);
 
@@ -446,7 +541,7 @@
   take(linked());
   now = numbers(law);
   const sensor = data.sensor && makeSensor(data.sensor, colours, () => draw("sensor")), player = slew && makePlayer(slew, colours, now.run, () => draw("slew", false));
-  window.live = { loop, discrete, slew, law, player, sensor, moves: [], set, room, lawFile, past, link, get now() { return now; }, rested: null };
+  window.live = { loop, discrete, scales, slew, law, player, sensor, moves: [], set, room, lawFile, past, link, get now() { return now; }, rested: null };
   move();
   window.live.ready = performance.now();
   document.body.dataset.ready = "yes";

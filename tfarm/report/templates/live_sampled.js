@@ -29,6 +29,19 @@ class SampledLoop {
     return Object.assign(this, { delay, fraction: f, early, late, flat, ramps: [(1 - f) ** 2 * T * T / 2, f * (1 - f / 2) * T * T] });
   }
 
+  later(samples) {
+    const total = this.delay + this.fraction + samples;
+    return Object.create(this).hold(Math.floor(total), total % 1);
+  }
+  // Whether each of some further delays up to `samples` leaves the loop stable: the steps of tfarm.loop.edges
+  isStableLate(law, samples) {
+    let near = null;
+    return [...Array(Math.ceil(10 * samples)).keys()].every(k => {
+      near = this.later(Math.min((k + 1) / 10, samples)).poles(law, near);
+      return near && near.every(({ growth }) => growth < 0);
+    });
+  }
+
   // What the law makes of each output: residues and static parts of their weighted sum, and apart those times a block of the law with
   // states, g prod(delta - zeros)/prod(delta - poles), delta = z - 1; the hub rate is such a one where it is a difference
   weighted(law) {
@@ -136,11 +149,22 @@ class SampledLoop {
     return roots.map(({ z, base, offset }) => ({ z, growth: this.growth(base, offset, z) }));
   }
 
-  // L at z = e^{iq} as D and N, D = 1, far from poles of the plant on the circle
+  // L at z, delta = z - 1, far from poles of the plant
+  at(z, delta, weights) {
+    const value = weights.reduce((sum, each) => add(sum, mul(this.transfer(each, z, -1, z)[0], this.filtered(each, delta)[0])), [0, 0]), angle = -this.delay * Math.atan2(z[1], z[0]);
+    return mul(value, times(size(z) ** -this.delay, [Math.cos(angle), Math.sin(angle)]));
+  }
+  // The same at z = e^{iq} as D and N, D = 1
   both(q, weights) {
-    const z = [Math.cos(q), Math.sin(q)], T = this.delay, delta = [-2 * Math.sin(q / 2) ** 2, z[1]];
-    const value = weights.reduce((sum, each) => add(sum, mul(this.transfer(each, z, -1, z)[0], this.filtered(each, delta)[0])), [0, 0]);
-    return [1, 0, ...mul(value, [Math.cos(T * q), -Math.sin(T * q)])];
+    const z = [Math.cos(q), Math.sin(q)];
+    return [1, 0, ...this.at(z, [-2 * Math.sin(q / 2) ** 2, z[1]], weights)];
+  }
+  // 1 + L at z as 1, and by name what each number of the law adds
+  terms(z) {
+    return { rest: [1, 0], ...Object.fromEntries(this.names.map(name => [name, this.at(z, minus(z, [1, 0]), this.weighted(this.unit(name)))])) };
+  }
+  unit(one) {
+    return Object.fromEntries(this.names.map(name => [name, +(name === one)]));
   }
   // What each gain adds to L at angles q near every pole of the plant
   get base() {
@@ -150,7 +174,7 @@ class SampledLoop {
     });
     const w = Float64Array.from(new Set([...close.filter(q => q > 1e-6 && q < Math.PI), Math.PI])).sort();
     const rows = this.names.map(one => {
-      const weights = this.weighted(Object.fromEntries(this.names.map(name => [name, +(name === one)])));
+      const weights = this.weighted(this.unit(one));
       return Float64Array.from([...w].flatMap(q => this.both(q, weights).slice(2)));
     });
     Object.defineProperty(this, "base", { value: { w, D: Float64Array.from([...w].flatMap(() => [1, 0])), rows } });
@@ -179,7 +203,7 @@ class SampledLoop {
   delayAt(law, top, from, side) {
     let more = from, q = top, off = 0;
     for (let k = 0; k < 12; k++) {
-      const total = this.delay + this.fraction + more, later = Object.create(this).hold(Math.floor(total), total % 1), weights = later.weighted(law);
+      const later = this.later(more), weights = later.weighted(law);
       const f = q => { const [, , x, y] = later.both(q, weights); return Math.log(x * x + y * y); };
       for (let h = (k ? 1e-5 : 1e-3) * q, j = 0; j < 10; j++, h *= 4) {
         const [a, b] = side ? [side < 0 ? top - h : top, side < 0 ? top : Math.min(top + h, Math.PI)] : [q - h, Math.min(q + h, Math.PI)], [fa, fb] = [f(a), f(b)];

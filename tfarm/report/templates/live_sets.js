@@ -100,24 +100,23 @@ function edgeOf(at, frequencies, [across, up], axes) {
   return found;
 }
 
-// The stable region of two numbers at the others of `law`, by intervals of the second at values of the first that are halved where a part begins or ends: a generator that yields before each
+// A region of two numbers, by a generator `intervals(x)` of the second at values x of the first, which are halved where a part begins or ends, or an end goes
+// farther than `step` of its axis: a generator that yields before each
 const SLICES = 80, CLOSER = 5; // values, and halvings between two of them
-function* regionOf(loop, law, axes) {
-  const [across, up] = loop.plane;
-  const column = share => { const gain = gainAt(axes[across], share, 12); return { share, gain, rows: loop.intervals({ ...law, [across]: gain }, axes[up].low, axes[up].high) }; };
+function* regionOf(intervals, [across, up], axes, step = 1) {
+  function* column(share) { yield; const gain = gainAt(axes[across], share, 12); return { share, gain, rows: yield* intervals(gain) }; }
   const goesOn = (a, b) => a.rows.length === b.rows.length && a.rows.every(([low, high], i) => low < b.rows[i][1] && b.rows[i][0] < high);
+  const isNear = (a, b) => a.rows.every((row, i) => row.every((end, j) => Math.abs(place(axes[up], end) - place(axes[up], b.rows[i][j])) <= step));
   const found = [];
   function* between(a, b, depth) {
-    if (!depth || goesOn(a, b)) return;
-    yield;
-    const middle = column((a.share + b.share) / 2);
+    if (!depth || (goesOn(a, b) && isNear(a, b))) return;
+    const middle = yield* column((a.share + b.share) / 2);
     yield* between(a, middle, depth - 1);
     found.push(middle);
     yield* between(middle, b, depth - 1);
   }
   for (let k = 0, last = null; k <= SLICES; k++) {
-    yield;
-    const next = column((k + 0.003) / (SLICES + 0.006)); // 0 may be an edge
+    const next = yield* column((k + 0.003) / (SLICES + 0.006)); // 0 may be an edge
     if (last) yield* between(last, next, CLOSER);
     found.push(next);
     last = next;
