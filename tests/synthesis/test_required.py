@@ -33,7 +33,7 @@ def test_laws_of_rigs_that_are_hard_to_meet(number):
     """No null controller and no violation left.
 
     The first mode of number 42 decays in 3.8 s whatever the gains; at Kp = 1e-4 and K1 = 4e-5 of their units best.
-    The exact delay margin of number 151 follows shifts of the model's by four fifths: few corrections leave a violation.
+    The exact delay margin of number 151 follows four fifths of a shift: few corrections leave a violation.
     """
     task = some_task(np.random.default_rng([1, number]))
     found = task.find([NamedArm("rig", task.arm, {})], None, "whole")
