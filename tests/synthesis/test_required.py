@@ -28,10 +28,15 @@ def test_the_settling_time_of_a_slow_loop_is_that_of_a_long_record():
     assert found == pytest.approx(last - first.busy_until, rel=0.02)
 
 
-def test_a_law_that_can_only_slow_a_vibration_down_is_no_null_controller():
-    """The first mode of this rig decays in 3.8 s whatever the gains; at Kp = 1e-4 and K1 = 4e-5 of their units best."""
-    task = some_task(np.random.default_rng([1, 42]))
-    found = task.find([NamedArm("rig", task.arm, {})], None, "near")
+@pytest.mark.parametrize("number", [42, 151])
+def test_laws_of_rigs_that_are_hard_to_meet(number):
+    """No null controller and no violation left.
+
+    The first mode of number 42 decays in 3.8 s whatever the gains; at Kp = 1e-4 and K1 = 4e-5 of their units best.
+    The exact delay margin of number 151 follows four fifths of a shift: few corrections leave a violation.
+    """
+    task = some_task(np.random.default_rng([1, number]))
+    found = task.find([NamedArm("rig", task.arm, {})], None, "whole")
     assert not is_null(task, found)
     assert found.violation <= 0
 

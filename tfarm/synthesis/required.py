@@ -148,7 +148,7 @@ class RequirementTask:
         step = 0
         chosen: RequiredLaw | None = None
         # with the large models of undamped arms a search takes a minute
-        attempts = 2 if any(each.arm.has_elastic_link for each in named) else 6
+        attempts = 2 if any(each.arm.has_elastic_link for each in named) else 8
         for attempt in range(attempts):
             judges = tuple(self.judge(each.arm, goal, step) for each in named)
             worst = Worst(judges[::-1])
@@ -228,7 +228,9 @@ class RequirementTask:
 
     def _corrected(self, goal: Goal, violations: Real) -> Goal:
         """Return the goal with what the exact loops have less: shifts, and the delays that make a loop unstable."""
-        shifts = np.where(violations > 0, 1.1 * violations + 1e-5, 0.0)
+        # a little more of a small one, so that few corrections end below the limit
+        more = np.minimum(0.5 * violations, 1e-3) + 1e-5
+        shifts = np.where(violations > 0, 1.1 * violations + more, 0.0)
         for n, each in enumerate(self.requirements):
             if each.name == DELAY and 0 < violations[0, n] < np.inf:
                 # the loop is unstable from there on, though not with every longer delay
