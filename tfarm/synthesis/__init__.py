@@ -17,6 +17,6 @@ goals           the least value of a quantity under requirements, and their exac
 required        the search for a law that meets requirements, and conflicts where none does
 trade_off       the front of speed against robustness
 limits          the margin that limits a loop, and the costs of sampling
-good_region     gains K1 and K2 of the grade good, and the fastest of them
+good_region     gains K1 and K2 that meet requirements, where a search for the best begins
 stability_map   stability regions of the gains K1 and K2, and their map
 """
