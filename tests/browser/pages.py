@@ -622,29 +622,22 @@ def test_a_pole_is_dragged_and_the_gains_follow(browser, folder, name, chart):
             assert law.by_name == pytest.approx(wanted.by_name, rel=0.05)
 
 
-def test_a_real_pole_goes_along_the_locus_and_a_pole_of_a_law_with_its_gains(browser, folder, tmp_path):
-    """The gain of the locus moves it alone; both first gains of a law of rational parts move a pair."""
-    (tmp_path / "law").mkdir()
-    name, law = LAWS[0]
-    save_live(ArmReport(tfarm.load(name), load_chain(name), (GivenLaw(law),)), tmp_path / "law")
-    write_assets(tmp_path / ASSETS)
-    for file, is_real in ((folder / ARMS[0] / "live.html", True), (tmp_path / "law" / "live.html", False)):
-        with Opened(browser, file) as opened:
-            page = opened.page
-            show_chart(page, "poles")
-            pole = next(s for s in poles_shown(page, "poles") if (s.imag == 0) is is_real and s.real < 0)
-            start, vary = page.evaluate("[{...live.law}, document.getElementById('vary').value]")
-            x, y = place_of(page, "poles", pole.real, pole.imag)
-            to = x - 5, y - 3 * (not is_real)
-            page.mouse.move(x, y - 2 * is_real)
-            page.mouse.down()
-            page.mouse.move(*to)
-            page.wait_for_function("start => Object.keys(start).some(k => live.now.law[k] !== start[k])", arg=start)
-            page.wait_for_timeout(200)
-            assert nearest_off(page, "poles", *to) < 1.0
-            page.mouse.up()
-            changed = {key for key, value in page.evaluate("live.law").items() if value != start[key]}
-            assert changed == ({vary} if is_real else set(list(start)[:2]))
+def test_a_real_pole_goes_along_the_locus(browser, folder):
+    """The gain of the locus moves it alone."""
+    with live_page(browser, folder) as opened:
+        page = opened.page
+        show_chart(page, "poles")
+        pole = next(s for s in poles_shown(page, "poles") if s.imag == 0 and s.real < 0)
+        start, vary = page.evaluate("[{...live.law}, document.getElementById('vary').value]")
+        x, y = place_of(page, "poles", pole.real, pole.imag)
+        page.mouse.move(x, y - 2)
+        page.mouse.down()
+        page.mouse.move(x - 5, y)
+        page.wait_for_function("start => Object.keys(start).some(k => live.now.law[k] !== start[k])", arg=start)
+        page.wait_for_timeout(200)
+        assert nearest_off(page, "poles", x - 5, y) < 1.0
+        page.mouse.up()
+        assert {key for key, value in page.evaluate("live.law").items() if value != start[key]} == {vary}
 
 
 def test_the_curve_of_the_gain_is_dragged_and_all_gains_follow(browser, folder):
