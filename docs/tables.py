@@ -27,6 +27,7 @@ from tfarm.digits import general
 from tfarm.fitting.decays import fit_ringdown
 from tfarm.fitting.recording import compare_run, load_run, overshoot, read_recording
 from tfarm.spectrum.table import hub_locked
+from tfarm.synthesis.requirements import MEASURES
 from tfarm.synthesis.structures import STRUCTURES
 
 ROOT = Path(__file__).parent.parent
@@ -264,6 +265,17 @@ def structures() -> list[str]:
     """Structures of a design and their formulas, as they are declared."""
     rows = ((f"`{name}`", of.formula) for name, of in STRUCTURES.items())
     return markdown_table(("`--structure`", "controller"), rows)
+
+
+@table
+def measures() -> list[str]:
+    """Quantities that a requirement limits, with their short forms."""
+    rows = []
+    for name, each in MEASURES.items():
+        loops = "sampled, in the slew" if each.of_slew else "both" if each.is_of(1) else "sampled"
+        names = ", ".join(f"`{word}`" for word in dict.fromkeys((each.short[0], name, *each.short[1:])))
+        rows.append((each.title, names, "share, or %" if each.is_share else each.unit, each.sense, loops))
+    return markdown_table(("quantity", "names", "unit", "limited by", "loops"), rows)
 
 
 @table

@@ -13,7 +13,7 @@ for period in (0.01, 0.02):  # s
     verdict = sampled_verdict(Case(arm, law, chain))  # tfarm.sampled has the margins too
     print(f"{1e3 * period:g} ms: {verdict.sentence}")
 
-runs = {f"K2 = {K2:g}": tfarm.simulate(arm, law.having("K2", K2), duration=3.0) for K2 in (0.0, 0.3)}
+runs = {f"K2 = {K2:g}": tfarm.simulate(arm, law.with_number("K2", K2), duration=3.0) for K2 in (0.0, 0.3)}
 for name, run in runs.items():
     after = run.at_samples.root_moment[run.t > 1.0]  # when the slew of 1 s is over
     print(f"{name}: up to {abs(after).max():.4g} N m at the root afterwards")

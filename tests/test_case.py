@@ -64,9 +64,9 @@ def test_signals_and_system_are_those_of_the_arm_and_the_controller():
 
 def test_other_cases_differ_in_one_part():
     case = Case(LAB, GAINS)
-    assert case.having("K2", 0.5).gains == tfarm.HubFeedback(K1=0.3, K2=0.5)
+    assert case.with_number("K2", 0.5).gains == tfarm.HubFeedback(K1=0.3, K2=0.5)
     assert case.under(tfarm.HubFeedback(K1=1.0)).gains == tfarm.HubFeedback(K1=1.0)
-    assert case.on(LAB.having(damping=0.01)).arm.damping == 0.01
+    assert case.on(LAB.with_numbers(damping=0.01)).arm.damping == 0.01
     assert case.through(Chain(sampling=Sampling(period=0.005))).chain.sampling.period == 0.005
     assert case == Case(LAB, GAINS)
     assert pickle.loads(pickle.dumps(case)) == case
@@ -109,5 +109,5 @@ def test_the_face_is_shown_as_its_card_and_says_where_there_is_none():
     card = tfarm.result_card(LAB, GAINS)
     assert shown.startswith("sasaki2012-lab: K1 = 0.3, K2 = 0.3, Kp = 0, sampled every 10 ms\n")
     assert f"{card.continuous.phase_margin.value:.4g} at" in shown
-    locked = tfarm.Case(LAB.having(hub_inertia=float("inf")), GAINS)
+    locked = tfarm.Case(LAB.with_numbers(hub_inertia=float("inf")), GAINS)
     assert "\nno result card: " in repr(locked)

@@ -7,6 +7,12 @@ from pathlib import Path
 
 import pytest
 
+import tfarm
+from tfarm import HubFeedback, closed_loop_poles
+from tfarm.arm import as_law
+from tfarm.case import Case
+from tfarm.loop.sampled import sampled_loop
+
 NAMES = (Path(__file__).parent / "data" / "names-1.0.txt").read_text(encoding="utf-8").split()
 
 
@@ -42,3 +48,28 @@ def test_moved_names_warn_and_unknown_ones_are_none():
     assert not found("tfarm.dsp.Chain")[1]
     with pytest.raises(AttributeError, match=r"module 'tfarm\.dsp\.chain' has no attribute 'Chains'"):
         found("tfarm.dsp.chain.Chains")
+
+
+def former_values():
+    """Records with a method or property that was renamed: what the former name gives and what the present one does."""
+    arm = tfarm.load("sasaki2012-lab")
+    gains = HubFeedback(K1=0.3, K2=0.3)
+    law = as_law(gains)
+    poles = closed_loop_poles(arm, gains, 3)
+    case = Case(arm, gains)
+    loop = sampled_loop(case, count=1)
+    yield lambda: arm.having(damping=0.0), arm.with_numbers(damping=0.0)
+    yield lambda: gains.having("K1", 1.0), gains.with_number("K1", 1.0)
+    yield lambda: law.having("K1", 1.0), law.with_number("K1", 1.0)
+    yield lambda: law.weighted([2.0, 3.0]), law.with_factors([2.0, 3.0])
+    yield lambda: case.having("K1", 1.0), case.with_number("K1", 1.0)
+    yield lambda: loop.having("K1", 1.0).number("K1"), 1.0
+    yield lambda: loop.weighted([1.0, 2.0, 3.0]).weights, (1.0, 2.0, 3.0)
+    yield lambda: poles.moving.tolist(), poles.nonzero.tolist()
+    yield lambda: poles.certified().discs, poles.certify()
+
+
+def test_former_names_of_methods_warn_and_serve():
+    for former, value in former_values():
+        with pytest.warns(DeprecationWarning, match=r"^\w+\.\w+ is \w+ now$"):
+            assert former() == value

@@ -18,7 +18,7 @@ def test_each_task_has_its_result_and_the_running_ones_are_named(monkeypatch):
     monkeypatch.delenv(BLAS, raising=False)
     tasks = {name: partial(str.upper, name) for name in "abcd"} | {"threads": partial(os.getenv, BLAS)}
     seen = []
-    found = dict(share_tasks(tasks.items(), 2, begun=seen.append))
+    found = dict(share_tasks(tasks.items(), 2, on_start=seen.append))
     assert found == {"a": "A", "b": "B", "c": "C", "d": "D", "threads": "1"}
     assert seen[0] == ["a", "b"]
     assert {name for names in seen for name in names} == set(tasks)
@@ -40,7 +40,7 @@ def test_a_process_that_joins_is_one_of_them_and_the_other_need_not_wait_for_it(
     file, seen = tmp_path / "third", []
     tasks = {"first": os.getpid, "second": partial(appears, file), "third": file.touch}
     tasks |= dict.fromkeys(range(5), os.getpid)
-    found = dict(share_tasks(tasks.items(), 2, begun=seen.append, joins=True))
+    found = dict(share_tasks(tasks.items(), 2, on_start=seen.append, joins=True))
     assert found["second"]
     assert found.keys() == tasks.keys()
     assert len({found[n] for n in ("first", *range(5))} - {os.getpid()}) == 1

@@ -34,11 +34,13 @@ def test_it_is_two_screens():
 def test_the_commands_print_what_is_shown(capsys, monkeypatch, tmp_path):
     """Numbers of a search are the same to a digit less than a search converges to."""
     monkeypatch.chdir(tmp_path)
+    outs = {}
     for line in SHELL:
         if line.startswith("tfarm "):
-            code, out, _ = run(capsys, *shlex.split(line)[1:])
+            verb, *words = shlex.split(line)[1:]
+            code, outs[verb], _ = run(capsys, verb, *words)
             assert code == 0
-    for printed, shown in zip(out.splitlines(), blocks("text")[0].splitlines(), strict=False):
+    for printed, shown in zip(outs["design"].splitlines(), blocks("text")[0].splitlines(), strict=False):
         (words, numbers), (wanted, limits) = (split_numbers(each) for each in (printed, shown))
         assert words == wanted
         assert numbers == pytest.approx(limits, rel=2e-3)

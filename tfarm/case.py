@@ -18,7 +18,7 @@ from tfarm.arm.feedback import AT_HUB, GAINS, HubFeedback
 from tfarm.arm.law import AnyLaw, Law, as_law
 from tfarm.arm.records import Arm, must_be_arm
 from tfarm.exact.system import System
-from tfarm.moved import moved
+from tfarm.moved import FormerName, moved
 from tfarm.records import frozen
 from tfarm.response.signals import Signals
 from tfarm.spectrum import Modes, modes
@@ -84,9 +84,11 @@ class Case:
         """The first ten modes of the arm without controller."""
         return modes(self.arm, 10)
 
-    def having(self, name: str, value: float) -> Case:
-        """Return the case with another value of one number of the controller, by its name in `Law.having`."""
-        return replace(self, law=self.law.having(name, value))
+    def with_number(self, name: str, value: float) -> Case:
+        """Return the case with another value of one number of the controller, by its name in `Law.with_number`."""
+        return replace(self, law=self.law.with_number(name, value))
+
+    having = FormerName("with_number")
 
     def under(self, law: AnyLaw) -> Case:
         """Return the case with another controller."""

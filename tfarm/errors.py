@@ -115,8 +115,11 @@ def unknown_key(word: str, known: Iterable[str]) -> str:
 
 
 def close_to(word: str, choices: Iterable[str]) -> list[str]:
-    """Return the nearest choice to a misspelt word, else up to three that begin with it."""
+    """Return the choice that is a word but for its capitals, else the nearest, else up to three that begin with it."""
     known = list(choices)
+    same = [choice for choice in known if choice.lower() == word.lower()]
+    if same:
+        return same[:1]
     begun = [choice for choice in known if word and choice.startswith(word)][:3]
     return difflib.get_close_matches(word[:80], known, n=1) or begun
 

@@ -5,6 +5,23 @@ import warnings
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from types import ModuleType
+from typing import Any
+
+
+class FormerName:
+    """A method or property of a record under a former name, which warns of its new one."""
+
+    def __init__(self, new: str) -> None:
+        self.new = new
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, record: object, owner: type) -> Any:
+        if record is None:
+            return self
+        warnings.warn(f"{owner.__name__}.{self.name} is {self.new} now", DeprecationWarning, stacklevel=2)
+        return getattr(record, self.new)
 
 
 def moved(module: str, places: Mapping[str, str]) -> Callable[[str], object]:

@@ -26,19 +26,19 @@ Result = TypeVar("Result")
 def share_tasks(
     tasks: Iterable[tuple[Job, Callable[[], Result]]],
     count: int,
-    begun: Callable[[Sequence[Job]], object] = lambda _: None,
+    on_start: Callable[[Sequence[Job]], object] = lambda _: None,
     *,
     joins: bool = False,
 ) -> Iterator[tuple[Job, Result]]:
     """Yield each task with its result as it comes, by `count` processes, or by this one for a count of 1.
 
     Where this one `joins`, it is one of them: a process less to start.
-    `begun` is called with the running tasks whenever one is begun.  An error of a task is raised here once the running
-    ones have ended; the others are not begun.  Raises ConvergenceError where a process dies.
+    `on_start` is called with the running tasks whenever one is begun.  An error of a task is raised here once the
+    running ones have ended; the others are not begun.  Raises ConvergenceError where a process dies.
     """
     if count == 1:
         for task, call in tasks:
-            begun([task])
+            on_start([task])
             yield task, call()
         return
     # which may make each task only when there is a process for it
@@ -62,10 +62,10 @@ def share_tasks(
                 return
             now = [*running.values()][:others]
             if own is None:
-                begun(now)
+                on_start(now)
             else:
                 task, call = own
-                begun([*now, task])
+                on_start([*now, task])
                 yield task, call()
             for future in wait(running, None if own is None else 0.0, FIRST_COMPLETED).done:
                 task = running.pop(future)

@@ -76,17 +76,17 @@ def test_each_number_of_a_law_is_what_its_name_gives_back():
     }  # fmt: skip
     s = np.array([0.3 + 5j, 40j])
     for name, value in law.numbers.items():
-        np.testing.assert_array_equal(law.having(name, value).values(s), law.values(s))
-        halved = law.having(name, value / 2).values(s)
+        np.testing.assert_array_equal(law.with_number(name, value).values(s), law.values(s))
+        halved = law.with_number(name, value / 2).values(s)
         assert (halved != law.values(s)).any()
     assert Law({"hub_angle": ([2.0, 1.0], [1.0])}).numbers.keys() == {
         "gain", "hub_angle.gain", "hub_angle.num.0", "hub_angle.num.1"
     }  # fmt: skip
     both = Law.of_matrices([[-1.0]], [[1.0, 2.0]], [[1.0]], [[0.0, 0.0]], ["hub_angle", "hub_rate"])
     assert both.numbers == {"gain": 1.0}
-    assert law.having("delay", 0.01).delay == 0.01
+    assert law.with_number("delay", 0.01).delay == 0.01
     with pytest.raises(ParameterError, match="hub_rate"):
-        law.having("hub_speed", 1.0)
+        law.with_number("hub_speed", 1.0)
 
 
 @pytest.mark.parametrize(

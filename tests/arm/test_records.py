@@ -153,13 +153,13 @@ def test_assumptions_are_plain_texts(assumptions):
 @pytest.mark.parametrize(("name", "value"), [("damping", 1e-4), ("length", 2.0), ("hub_inertia", 0.3)])
 def test_an_arm_with_another_number_is_the_same_but_for_it(name: str, value: float) -> None:
     arm = tfarm.load("sasaki2012-lab")
-    other = arm.having(**{name: value})
+    other = arm.with_numbers(**{name: value})
     assert getattr(other, name) == value
-    assert other.having(**{name: getattr(arm, name)}) == arm
-    assert arm.having(hub_inertia=0.3).hub == tfarm.Hub(inertia=0.3)
-    assert arm.having(payload_mass=1.0, payload_inertia=0.2).payload == tfarm.Payload(mass=1.0, inertia=0.2)
+    assert other.with_numbers(**{name: getattr(arm, name)}) == arm
+    assert arm.with_numbers(hub_inertia=0.3).hub == tfarm.Hub(inertia=0.3)
+    assert arm.with_numbers(payload_mass=1.0, payload_inertia=0.2).payload == tfarm.Payload(mass=1.0, inertia=0.2)
     with pytest.raises(tfarm.ParameterError, match="length"):
-        arm.having(length=-1.0)
+        arm.with_numbers(length=-1.0)
 
 
 @pytest.mark.parametrize("value", [True, 1.0, "2", None, 0, 8])

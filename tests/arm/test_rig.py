@@ -86,7 +86,7 @@ def test_what_is_read_off_several_segments():
     assert RIG.damping == 2e-4
     assert system_of(RIG).singular == (-2e4, -5e3)
     assert system_of(replace(RIG, outer=(ROOT, TIP, replace(TIP, damping=0.0)))).singular == (-2e4, -5e3)
-    assert system_of(PLAIN.having(damping=0.0)).singular == ()
+    assert system_of(PLAIN.with_numbers(damping=0.0)).singular == ()
     assert RIG.own_mass == pytest.approx(7850 * 0.04 * 0.006 * 0.3 + 2700 * 0.03 * 0.004 * 0.2, rel=1e-15)
     assert RIG.bending_scale == ROOT.EI / 0.5
     assert RIG.shear_cutoff == PLAIN.shear_cutoff  # the inner segment is the deeper one
@@ -112,7 +112,7 @@ def test_only_the_paper_s_arm_is_uniform(part):
     assert not replace(PLAIN, **USES[part]).is_uniform
 
 
-IDLE = replace(PLAIN.having(damping=0.0), motor=MOTOR)
+IDLE = replace(PLAIN.with_numbers(damping=0.0), motor=MOTOR)
 LOSSES = {
     "a segment": ({"outer": (TIP,)}, False),
     "an undamped segment": ({"outer": (replace(TIP, damping=0.0),)}, True),
@@ -147,7 +147,7 @@ def test_a_rig_is_undamped_only_without_any_loss(part):
     ],
 )
 def test_a_hub_is_massless_only_where_nothing_resists_its_turning(change):
-    pin = PLAIN.having(hub_inertia=0.0)
+    pin = PLAIN.with_numbers(hub_inertia=0.0)
     assert pin.has_massless_hub
     assert replace(pin, motor=replace(MOTOR, rotor_inertia=0.0)).has_massless_hub
     assert not replace(pin, **change).has_massless_hub
@@ -172,20 +172,20 @@ def test_a_held_rig_does_not_turn_and_the_message_names_the_cause(key):
 
 
 def test_a_locked_hub_needs_no_friction_spring_or_motor():
-    """`having` asks for the hub-locked rig of any rig; what stays is what still acts."""
-    locked = replace(RIG, hub=replace(RIG.hub, stiffness=0.3)).having(hub_inertia=math.inf)
+    """`with_numbers` asks for the hub-locked rig of any rig; what stays is what still acts."""
+    locked = replace(RIG, hub=replace(RIG.hub, stiffness=0.3)).with_numbers(hub_inertia=math.inf)
     assert locked == replace(RIG, hub=Hub(inertia=math.inf, radius=0.05), motor=None, input="hub_torque")
     assert locked.is_locked
     assert not RIG.is_locked
     assert replace(RIG, input="hub_angle").is_locked
-    assert replace(RIG, input="hub_angle").having(hub_inertia=math.inf).input == "hub_angle"
+    assert replace(RIG, input="hub_angle").with_numbers(hub_inertia=math.inf).input == "hub_angle"
 
 
 def test_of_several_segments_none_is_changed_unasked():
     with pytest.raises(ParameterError, match=r"^length = 0\.1: ambiguous, as there are 2 segments"):
-        RIG.having(length=0.1)
-    assert {link.damping for link in RIG.having(damping=0.1).links} == {0.1}
-    assert RIG.having(payload_mass=0.3, hub_inertia=0.1).payload == Payload(mass=0.3, inertia=3e-5, offset=0.02)
+        RIG.with_numbers(length=0.1)
+    assert {link.damping for link in RIG.with_numbers(damping=0.1).links} == {0.1}
+    assert RIG.with_numbers(payload_mass=0.3, hub_inertia=0.1).payload == Payload(mass=0.3, inertia=3e-5, offset=0.02)
 
 
 def test_the_back_emf_constant_is_the_torque_constant_unless_given():

@@ -313,7 +313,7 @@ def some_arm(rng):
         if 3 <= first <= 1000:
             break
     ratio = 0.0 if rng.random() < 0.15 else log(rng, 1e-4, 0.2)
-    arm = arm.having(damping=2 * ratio / first)
+    arm = arm.with_numbers(damping=2 * ratio / first)
     if rng.random() < 0.07:
         arm = replace(arm, hub=replace(arm.hub, stiffness=arm.total_inertia * first**2 * log(rng, 1e-3, 1.0)))
     if rng.random() < 0.07:

@@ -27,7 +27,7 @@ def some_loops(count):
     """Arms with damped links under gains at the hub, both loops stable, at periods of 1 to 10 ms, with their cards."""
     rng, found = np.random.default_rng(20261126), []
     while len(found) < count:
-        arm = LAB.having(damping=10 ** rng.uniform(-4, -3), payload_mass=LAB.payload.mass * rng.uniform(0.2, 3))
+        arm = LAB.with_numbers(damping=10 ** rng.uniform(-4, -3), payload_mass=LAB.payload.mass * rng.uniform(0.2, 3))
         law = tfarm.HubFeedback(K1=10 ** rng.uniform(-1, 0), K2=rng.uniform(-0.1, 0.5), Kp=10 ** rng.uniform(-1, 0.5))
         chain = Chain(sampling=Sampling(period=10 ** rng.uniform(-3, -2)))
         both = tfarm.margins(arm, law).stability.is_stable, sampled_verdict(Case(arm, law, chain)).is_stable
@@ -141,15 +141,16 @@ def test_delay_margin_disk_and_time_constant_are_those_of_the_records():
 def test_an_undamped_arm_keeps_its_stability_and_is_graded_with_a_little_damping():
     own = tfarm.result_card(BARE, LAW)
     C = card.reference_damping(BARE)
-    assert tfarm.damped_modes(tfarm.modes(BARE.having(damping=C), 1)).damping_ratio[-1] == pytest.approx(1e-3, rel=1e-3)
-    damped = tfarm.result_card(BARE.having(damping=C), LAW)
+    graded = BARE.with_numbers(damping=C)
+    assert tfarm.damped_modes(tfarm.modes(graded, 1)).damping_ratio[-1] == pytest.approx(1e-3, rel=1e-3)
+    damped = tfarm.result_card(graded, LAW)
     assert own.continuous.phase_margin == damped.continuous.phase_margin
     assert (own.continuous.stability, own.sampled.stability) == ("stable", "unstable")
     assert own.sampled.phase_margin.value is None
     assert "undamped model" in own.notes[-1]
     figure = tfarm.sampled(BARE, LAW).minimum_damping
     assert (figure.value, figure.digits) == (own.sampled.minimum_damping, 4)
-    sides = [tfarm.sampled(BARE.having(damping=share * figure.value), LAW) for share in (0.99, 1.01)]
+    sides = [tfarm.sampled(BARE.with_numbers(damping=share * figure.value), LAW) for share in (0.99, 1.01)]
     assert [each.verdict.is_stable for each in sides] == [False, True]
 
 
@@ -229,7 +230,7 @@ def test_a_positive_real_pole_has_no_damping_ratio_whatever_rounding_leaves_of_i
 
 def test_a_delay_margin_at_the_end_of_its_search_is_a_lower_bound():
     rig, chain = tfarm.load("quanser-flexlink"), load_chain("quanser-flexlink")
-    rig, law = rig.having(damping=card.reference_damping(rig)), tfarm.default_gains(rig)
+    rig, law = rig.with_numbers(damping=card.reference_damping(rig)), tfarm.default_gains(rig)
     own, found = tfarm.result_card(rig, law, chain), tfarm.sampled(rig, law, chain)
     assert found.is_lower_bound
     assert own.sampled.delay_margin.as_text(4) == f"≥ {1e3 * found.delay_margin_seconds:g}, good"

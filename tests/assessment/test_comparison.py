@@ -46,7 +46,7 @@ def test_four_times_as_stiff_is_twice_as_fast_and_twice_the_damping_twice_the_ra
     for one, _, apart in (rows[f"mode {mode}: natural frequency"] for mode in range(1, 6)):
         assert apart == pytest.approx(one, rel=1e-13)
     assert found.is_of_arms
-    found = tfarm.compare([LAB, LAB.having(damping=2 * LAB.damping)], names=("C", "2 C"), modes=2)
+    found = tfarm.compare([LAB, LAB.with_numbers(damping=2 * LAB.damping)], names=("C", "2 C"), modes=2)
     for mode, tolerance in ((1, 1e-3), (2, 5e-3)):
         one, _, apart = by_quantity(found.mode_differences)[f"mode {mode}: damping ratio"]
         assert apart == pytest.approx(one, rel=tolerance)

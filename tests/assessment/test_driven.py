@@ -39,7 +39,7 @@ ANSWERS = {
     "loop function": lambda arm, chain, _: to_dict(tfarm.loop_function(arm, GAINS, chain)),
     "comparison": lambda arm, chain, _: [
         (side.poles, side.sampled.words)
-        for side in compare(arm, [GAINS, GAINS.having("K2", 0.1)], chain=chain, modes=2).sides
+        for side in compare(arm, [GAINS, GAINS.with_number("K2", 0.1)], chain=chain, modes=2).sides
     ],
     "slew": lambda arm, chain, _: to_dict(tfarm.step(arm, GAINS, chain, "slew", 2.0)),
     "deflection": lambda arm, chain, _: to_dict(tfarm.step(arm, GAINS, chain, "deflection", 2.0)),

@@ -19,7 +19,7 @@ from tfarm.arm.stages import ARM_KEYS, STAGE_OF, STAGES, Consumer, Stage
 from tfarm.assessment import step
 from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain, Converters, ReferenceShaping, kernel
-from tfarm.dsp.results import simulated_run
+from tfarm.dsp.results import simulate_scenario
 from tfarm.errors import ParameterError
 from tfarm.exact import system
 from tfarm.exact.system import system_of
@@ -125,7 +125,7 @@ def tuner_in_c(arm, chain):
 
 
 def run_of(arm, chain):
-    return simulated_run(Case(arm, GAINS, chain), "slew", 1.5, count=3).signals
+    return simulate_scenario(Case(arm, GAINS, chain), "slew", 1.5, count=3).signals
 
 
 def answers_of_samples(arm, chain):

@@ -20,7 +20,7 @@ HOSTILE = f"{TEXT} {LONG}"
 
 @pytest.fixture(scope="module")
 def compared():
-    return tfarm.compare([LAB, LAB.having(hub_inertia=0.15)], names=("lab", HOSTILE), modes=2)
+    return tfarm.compare([LAB, LAB.with_numbers(hub_inertia=0.15)], names=("lab", HOSTILE), modes=2)
 
 
 @pytest.fixture(scope="module")

@@ -198,11 +198,11 @@ def test_a_column_of_references_is_the_reference_of_its_signal():
             np.testing.assert_allclose(y, expected, rtol=1e-8, atol=1e-10 * abs(expected).max())
 
 
-PINNED = LAB.having(payload_mass=math.inf)
+PINNED = LAB.with_numbers(payload_mass=math.inf)
 REFUSED = {  # arm, law, scenario, and words of the refusal
-    "locked": (LAB.having(hub_inertia=math.inf), LAW, "slew", "locked hub"),
+    "locked": (LAB.with_numbers(hub_inertia=math.inf), LAW, "slew", "locked hub"),
     "driven angle": (replace(LAB, input="hub_angle"), LAW, "slew", "input = .hub_angle."),
-    "algebraic": (LAB.having(hub_inertia=0.0), LAW, "slew", "K2 = 0.3"),
+    "algebraic": (LAB.with_numbers(hub_inertia=0.0), LAW, "slew", "K2 = 0.3"),
     "unknown": (LAB, LAW, "impulse", "scenario = .impulse"),
     "no reference": (LAB, tfarm.HubFeedback(K2=0.3), "reference", "neither hub angle nor hub rate"),
     "no such reference": (
@@ -226,7 +226,7 @@ def test_a_record_has_whole_samples_and_one_shorter_than_a_period_is_refused(sce
     with pytest.raises(tfarm.ParameterError, match=r"duration = 0\.004: at least one sampling period, 0\.01 s"):
         tfarm.step(LAB, LAW, None, scenario, 0.004)
     assert tfarm.step(LAB, LAW, None, scenario, 0.011).t[-1] >= 0.01
-    arm, law = (LAB.having(hub_inertia=0.0), tfarm.HubFeedback(K1=0.3)) if scenario == "pulse" else (LAB, LAW)
+    arm, law = (LAB.with_numbers(hub_inertia=0.0), tfarm.HubFeedback(K1=0.3)) if scenario == "pulse" else (LAB, LAW)
     found = tfarm.step(arm, law, None, scenario, 0.2049)
     assert (found.duration, found.t[-1], found.continuous.stability) == (0.2, 0.2, "stable")
     assert all(np.isfinite(y).all() for y in found.continuous.signals.values())

@@ -28,7 +28,7 @@ from tfarm.arm.law_tables import load_law
 from tfarm.assessment.card import LoopCard, reference_damping
 from tfarm.case import Case
 from tfarm.dsp import Chain, load_chain
-from tfarm.dsp.results import simulated_run
+from tfarm.dsp.results import simulate_scenario
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.margins import margins
 from tfarm.loop.plane import gain_map
@@ -37,7 +37,7 @@ from tfarm.loop.stability import stability
 from tfarm.report.live import ASSETS, SCRIPT, LivePage, save_live, write_assets
 from tfarm.report.page import ArmReport, GivenLaw
 from tfarm.schema import to_dict
-from tfarm.synthesis.stability_map import recommended_gains
+from tfarm.synthesis.design import recommended_gains
 
 Real = NDArray[np.float64]
 
@@ -134,7 +134,7 @@ def set_gains(page: Page, law: HubFeedback) -> None:
 
 def slew_words(arm: Arm, law: HubFeedback, chain: Chain, modes: int) -> dict[str, str]:
     """What the page shows of a slew, from the answer of `tfarm simulate`."""
-    answer = to_dict(simulated_run(Case(arm, law, chain), "slew", 3 * chain.slew.rise_time, count=modes))
+    answer = to_dict(simulate_scenario(Case(arm, law, chain), "slew", 3 * chain.slew.rise_time, count=modes))
     settled = answer["settling_time_s"]
     largest = {name: max(map(abs, answer[key])) for name, key in (("torque", "torque"), ("moment", "root_moment"))}
     figures = largest | {"residual": answer["residual_moment_rms"]}  # none of a run that stopped
@@ -200,7 +200,7 @@ def test_what_is_shown_at_random_gains_is_what_tfarm_prints(browser, folder, nam
         page, stable = opened.page, [0, 0]
         data = live_data(page)
         start = HubFeedback(**data["start"])
-        slow = start.having("K1", 0.1 * data["axes"]["K1"]["linear"])  # rounding in its margins
+        slow = start.with_number("K1", 0.1 * data["axes"]["K1"]["linear"])  # rounding in its margins
         for law in (slow, start, *random_gains(data, GAINS)):
             set_gains(page, law)
             found, verdict = margins(arm, law, data["band"]), sampled_verdict(Case(arm, law, chain))
@@ -272,13 +272,13 @@ def test_loci_have_the_poles_of_their_gains(browser, folder, name):
             assert turns.size > 5
             assert turns.max() <= LARGEST_TURN
         for row in rows[:: len(rows) // 6]:
-            exact = stability(Case(arm, law.having("K2", row["gain"])), band).poles.values
+            exact = stability(Case(arm, law.with_number("K2", row["gain"])), band).poles.values
             s = complex(row["re"], row["im"])
             assert abs(exact - s).min() < 5e-4 * abs(s), row
         loop = sampled_verdict(Case(arm, law, chain)).full
         for row in discs[:: len(discs) // 12]:
             z = complex(row["re"], row["im"])
-            assert abs(loop.having("K2", row["gain"]).poles.z - z).min() < 1e-6, row
+            assert abs(loop.with_number("K2", row["gain"]).poles.z - z).min() < 1e-6, row
         box = show_chart(page, "poles")
         page.wait_for_function("live.now.locus?.length", timeout=60_000)
         pole = page.evaluate("[live.now.near[1][0], live.now.near[1][1], live.now.frame]")
@@ -295,7 +295,7 @@ def test_the_region_of_a_hub_that_is_held_is_the_librarys(browser, folder, name)
     with live_page(browser, folder, name) as opened:
         page = opened.page
         axes = page.evaluate("live.loop.axes")
-        set_gains(page, HubFeedback(**page.evaluate("live.loop.start")).having("Kp", 0.02 * axes["Kp"]["high"]))
+        set_gains(page, HubFeedback(**page.evaluate("live.loop.start")).with_number("Kp", 0.02 * axes["Kp"]["high"]))
         page.wait_for_function("live.now.areas", timeout=60_000)
         areas, Kp = page.evaluate("[live.now.areas, live.now.law.Kp]")
         columns = sorted({row["K1"] for row in areas})[3 :: len(areas) // 5]
@@ -339,10 +339,11 @@ def test_a_chord_of_the_loop_function_is_within_a_pixel_of_it(browser, folder, n
     arm, chain = tfarm.load(name), load_chain(name)
     with live_page(browser, folder, name) as opened:
         page = opened.page
-        law = HubFeedback(**page.evaluate("live.loop.start")).having("K1", 0.5 * page.evaluate("live.loop.start.K1"))
+        start = HubFeedback(**page.evaluate("live.loop.start"))
+        law = start.with_number("K1", 0.5 * start.K1)
         set_gains(page, law)
         pixels = page.evaluate("live.room('nyquist')[0]") / 5.0  # of 1, where that is the shorter side
-        graded = arm.having(damping=reference_damping(arm)) if arm.has_elastic_link else arm
+        graded = arm.with_numbers(damping=reference_damping(arm)) if arm.has_elastic_link else arm
         of = arm if sampled_verdict(Case(arm, law, chain)).word == "unstable" else graded
         exact = (ContinuousLoop(Case(graded, law)).parts, sampled_verdict(Case(of, law, chain)).full.parts)
         for key, parts in zip(("curve", "zcurve"), exact, strict=True):
@@ -540,7 +541,7 @@ def test_what_the_requirements_forbid_is_shaded_and_the_recommended_gains_are_go
         page = opened.page
         page.click("#recommend")
         page.wait_for_function("() => live.rested === live.now.law")
-        chosen = recommended_gains(tfarm.load(ARMS[0]), load_chain(ARMS[0])).law
+        chosen = recommended_gains(tfarm.load(ARMS[0]), load_chain(ARMS[0]))[0].law
         assert page.evaluate("live.law") == chosen.by_name
         for grade in ("s-phase", "s-delay", "s-peak", "z-phase", "z-delay", "z-peak"):
             assert page.inner_text(f"#{grade}-grade") == "good"
@@ -675,7 +676,7 @@ def test_a_law_of_rational_parts_has_a_slider_for_the_gain_of_each(browser, tmp_
                 page.locator(f"[id='{key}']").fill(repr(value))
                 page.locator(f"[id='{key}']").dispatch_event("change")
             page.wait_for_function("gains => Object.keys(gains).every(k => live.now.law[k] === gains[k])", arg=gains)
-            now = law.weighted(factors.tolist())
+            now = law.with_factors(factors.tolist())
             both = tfarm.result_card(arm, now, chain)
             card, sampled = both.continuous, both.sampled
             assert card is not None

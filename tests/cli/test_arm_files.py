@@ -181,7 +181,7 @@ def test_check_has_the_numbers_of_a_textbook(capsys, tmp_path):
     assert found["euler_bernoulli_error"] == pytest.approx(omega / found["first_frequency_rad_s"] - 1, rel=1e-6)
     assert 0 < found["euler_bernoulli_error"] < 1e-4
     assert (found["damping_ratio"], found["law"]) == (0.0, [])
-    assert found["next_command"] == f"tfarm margins {file}"
+    assert found["next_command"] == f"tfarm design {file} --save law.toml"
     # with a locked hub 1.8751^2 sqrt(EI/(rho A L^4)), and no margins to look at
     written(capsys, file, *STEEL[:-1], "inf", "--force")
     found = answer(capsys, "check", str(file))

@@ -166,7 +166,7 @@ def test_a_file_is_read_once_in_a_command(tmp_path):
         "sampled my-arm.toml --law my-law.toml --modes 3": "my-arm.toml my-law.toml",
         "check my-arm.toml": "my-arm.toml",
         "compare sasaki2012 my-arm.toml --law my-law.toml --modes 2": "my-arm.toml my-law.toml",
-        "design my-arm.toml --modes 1 --structure PD": "my-arm.toml",
+        "design my-arm.toml --modes 1 --minimise damping": "my-arm.toml",
     }
     words = [sys.executable, "-c", OPENED, *lines]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)

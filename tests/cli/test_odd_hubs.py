@@ -24,7 +24,8 @@ def test_every_command_is_among_them():
     assert commands_of(whole_command()).keys() == OF_AN_ARM.keys() | OF_NO_ARM
 
 
-LIKE_OTHERS = {("report", "pinned"), ("report", "spring"), ("sensitivity", "pinned"), ("nichols", "pinned")}
+ON_PINNED = ("report", "sensitivity", "nichols", "design")
+LIKE_OTHERS = {("report", "spring"), *((command, "pinned") for command in ON_PINNED)}
 CASES = [
     pytest.param(command, hub, marks=[pytest.mark.survey] * ((command, hub) in LIKE_OTHERS))
     for command in OF_AN_ARM for hub in HUBS

@@ -23,7 +23,7 @@ def test_hub_locked_frequencies_are_listed_with_the_free_ones_and_interlace_them
     assert rigid["hub_locked_rad_s"] is None
     assert all(low < high for low, high in zip(locked, free, strict=True))
     assert all(low < high for low, high in zip(free, locked[1:], strict=False))
-    elements = chain_elements.natural_frequencies(tfarm.load(rig).having(hub_inertia=math.inf), 4)
+    elements = chain_elements.natural_frequencies(tfarm.load(rig).with_numbers(hub_inertia=math.inf), 4)
     np.testing.assert_allclose(locked, elements, rtol=1e-8)
     assert "dry friction" in found["hub_locked_note"]
 

@@ -79,7 +79,7 @@ DASHED = [
     ("response sasaki2012 --output hub_rate --points 3", "--csv"),
     ("bode sasaki2012-lab --to 50", "--png"),
     ("simulate sasaki2012-lab --duration 0.05 --modes 2", "--mat"),
-    ("design sasaki2012-lab --continuous --modes 1 --K1 0.1,2 --K2=-0.1,0.1", "--save"),
+    ("design sasaki2012-lab --continuous --modes 1 --minimise damping", "--save"),
 ]
 
 

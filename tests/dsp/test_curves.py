@@ -43,7 +43,7 @@ def test_a_fast_ringing_is_drawn_as_a_band_that_holds_the_curve():
 
 
 def test_the_slew_of_a_stiff_arm_is_not_aliased_and_its_file_has_the_curve():
-    run = simulate_for_picture(Case(STEEL, default_gains(STEEL).having("K2", 0.0), Chain()), "slew", 3.0)
+    run = simulate_for_picture(Case(STEEL, default_gains(STEEL).with_number("K2", 0.0), Chain()), "slew", 3.0)
     records = run.between.t.size / run.t.size
     first = tfarm.modes(STEEL, 1).natural_frequency[-1] / (2 * np.pi)
     assert (records + 1) * 100 >= POINTS_A_PERIOD * first > 400  # 400 a second is what three records gave

@@ -64,7 +64,7 @@ CHAINS = {
     "damped hub": Chain(actuator=Actuator(hub_damping=0.05)),
 }
 INSIDE = Law({"hub_rate": 0.3, "moment@0.2": ([0.02], [1.0, -0.5])}, period=0.01)  # which reads the rig at a point
-ARMS = [LAB, LAB.having(damping=0.01), replace(LAB, hub=replace(LAB.hub, radius=0.1))]
+ARMS = [LAB, LAB.with_numbers(damping=0.01), replace(LAB, hub=replace(LAB.hub, radius=0.1))]
 
 
 @pytest.mark.parametrize(("arm", "law", "kind"), thinned(product(ARMS, [GAINS, INSIDE], CHAINS), 4))
@@ -154,7 +154,7 @@ def test_the_feedforward_of_a_slew_turns_the_rig_against_its_friction(name):
 @pytest.mark.parametrize("factor", [1.0, -40.0])
 def test_the_verdict_on_a_damped_rig_is_proven(name, factor):
     """Poles of friction and of the circuit are among those that are counted; as many grow as in a stepped model."""
-    arm = tfarm.load(name).having(damping=2e-5)
+    arm = tfarm.load(name).with_numbers(damping=2e-5)
     gains = tfarm.default_gains(arm).times(factor)
     verdict = sampled_verdict(Case(arm, gains))
     assert verdict.is_settled

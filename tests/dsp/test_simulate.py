@@ -13,7 +13,7 @@ from tfarm.arm import HubFeedback
 from tfarm.case import Case
 from tfarm.dsp import Actuator, Chain, Converters, Sampling, Simulator, scenario
 from tfarm.dsp.kernel import estimate
-from tfarm.dsp.results import ideal_chain, limit_cycle, simulated_run
+from tfarm.dsp.results import ideal_chain, limit_cycle, simulate_scenario
 from tfarm.dsp.simulation import settling_time
 from tfarm.errors import ParameterError
 from tfarm.loop.sampled import sampled_loop
@@ -119,24 +119,24 @@ def test_an_unstable_loop_that_its_motor_limits_rings_for_ever(lab):
     assert (one.kept_up_by, one.torque) == ("saturation", 3.0)
     assert two.root_moment == pytest.approx(2 * one.root_moment, rel=1e-6)  # what rounding makes of 20 s of ringing
     assert two.frequency == one.frequency
-    answer = to_dict(simulated_run(Case(lab, gains, chain), "impulse", 20.0, count=8))
+    answer = to_dict(simulate_scenario(Case(lab, gains, chain), "impulse", 20.0, count=8))
     assert answer["limit_cycle"]["kept_up_by"] == "saturation"
 
 
 def test_a_simulation_uses_enough_modes_or_reports_its_error(lab, lossless):
     """20 modes do after a slew, and with damping after an impulse; without it 40 do not, and the error is right."""
     for task, duration in (("slew", 1.5), ("impulse", 0.5)):
-        enough = to_dict(simulated_run(Case(lab, GAINS, Chain()), task, duration))
+        enough = to_dict(simulate_scenario(Case(lab, GAINS, Chain()), task, duration))
         assert (enough["modes_used"], enough["modes_change"] < 1e-4) == (20, True)
         fine = simulator(lab, task, duration, count=30).linear(GAINS).at_samples
         off = abs(enough["root_moment"] - fine.root_moment).max() / abs(fine.root_moment).max()
         assert 0 < off < max(enough["modes_change"], ROUNDED)
-    sudden = to_dict(simulated_run(Case(lossless, GAINS, Chain()), "impulse", 0.5))
+    sudden = to_dict(simulate_scenario(Case(lossless, GAINS, Chain()), "impulse", 0.5))
     assert (sudden["modes_used"], sudden["modes_change"] > 1e-4) == (40, True)
     more = simulator(lossless, "impulse", 0.5, count=160).linear(GAINS).at_samples
     off = abs(sudden["root_moment"] - more.root_moment).max() / abs(more.root_moment).max()
     assert 1e-4 < off < 2 * sudden["modes_change"]
-    limited = to_dict(simulated_run(Case(lab, GAINS, Chain()), "slew", 0.1, count=3))
+    limited = to_dict(simulate_scenario(Case(lab, GAINS, Chain()), "slew", 0.1, count=3))
     assert (limited["modes_used"], limited["modes_change"]) == (3, None)
 
 
@@ -167,7 +167,7 @@ def test_divergence_is_reported_with_its_time_and_mode(lab):
     assert f"mode {run.stopped.mode}" == dominant(sampled_loop(Case(lab, HubFeedback(K1=0.3, K2=1.5)), count=8))
     for signal in (run.torque, run.at_samples.root_moment, run.at_samples.tip_displacement):
         assert np.isfinite(signal).all()
-    answer = to_dict(simulated_run(Case(lab, HubFeedback(K1=0.3, K2=1.5), Chain()), "slew", 5.0, count=8))
+    answer = to_dict(simulate_scenario(Case(lab, HubFeedback(K1=0.3, K2=1.5), Chain()), "slew", 5.0, count=8))
     assert answer["settling_time_s"] is None
     assert answer["stopped_at_s"] == run.stopped.time
 
@@ -198,9 +198,9 @@ PINNED = {"payload_mass": np.inf}
 @pytest.mark.parametrize(
     ("run", "words"),
     [
-        (lambda lab: simulator(lab.having(**PINNED)), r"payload\.mass = inf: .*no slew"),
-        (lambda lab: simulator(lab.having(payload_inertia=np.inf)), r"payload\.inertia = inf: .*no slew"),
-        (lambda lab: simulator(lab.having(**PINNED), "decay", 1.0, count=3).linear(GAINS), "no free decay"),
+        (lambda lab: simulator(lab.with_numbers(**PINNED)), r"payload\.mass = inf: .*no slew"),
+        (lambda lab: simulator(lab.with_numbers(payload_inertia=np.inf)), r"payload\.inertia = inf: .*no slew"),
+        (lambda lab: simulator(lab.with_numbers(**PINNED), "decay", 1.0, count=3).linear(GAINS), "no free decay"),
         (lambda lab: simulator(lab, "slow"), 'did you mean "slew"'),
         (lambda lab: simulator(lab, "step", 1e9), "at most 4000000 samples"),
         (lambda lab: simulator(lab, "step", -1.0), "duration"),

@@ -53,7 +53,7 @@ def test_the_hash_is_that_of_arm_law_and_chain():
         return task_of((arm, law, chain)).sha256
 
     faster = tfarm.dsp.Chain(sampling=tfarm.dsp.Sampling(period=0.005))
-    others = sha(law=tfarm.HubFeedback(K1=0.3, K2=0.31)), sha(arm=LAB.having(payload_mass=0.2)), sha(chain=faster)
+    others = sha(law=tfarm.HubFeedback(K1=0.3, K2=0.31)), sha(arm=LAB.with_numbers(payload_mass=0.2)), sha(chain=faster)
     assert sha() == sha()
     assert len({sha(), *others}) == 4
 

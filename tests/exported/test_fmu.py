@@ -33,7 +33,7 @@ from tfarm import Law, ParameterError
 from tfarm.arm import HubFeedback
 from tfarm.case import Case
 from tfarm.dsp import Simulator, scenario
-from tfarm.dsp.results import simulated_run
+from tfarm.dsp.results import simulate_scenario
 from tfarm.exported import fmu as module
 
 MODES = 4
@@ -89,7 +89,7 @@ def test_a_loop_is_that_of_the_simulation(case):
     gains under every stage of a chain."""
     arm, law, chain, name = LOOPS[case]
     unit, exported = made("loop", case)
-    truth = simulated_run(Case(arm, law, chain), name, 1.5, count=MODES).simulation
+    truth = simulate_scenario(Case(arm, law, chain), name, 1.5, count=MODES).simulation
     task, n = truth.scenario, truth.t.size
     assert truth.stopped is None
     unit.start(impulse=task.impulse)
@@ -210,7 +210,7 @@ def test_an_unstable_loop_stops_where_the_simulation_does():
     unit, exported = made("loop", "unstable")
     assert exported.verdict.startswith("NOT CERTIFIED STABLE")
     assert "NOT CERTIFIED STABLE" in unit.xml.get("description")
-    truth = simulated_run(Case(LAB, law, IDEAL), "slew", 30.0, count=MODES).simulation
+    truth = simulate_scenario(Case(LAB, law, IDEAL), "slew", 30.0, count=MODES).simulation
     unit.start()
     inputs, last = inputs_of(truth.scenario), truth.t.size - 1
     for k in range(last):
@@ -409,7 +409,7 @@ def test_an_arm_without_a_slew_has_the_modes_of_a_step(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "binary_of", lambda sources, identifier: ({}, "none"))
     held = replace(LAB, hub=replace(LAB.hub, stiffness=20.0))
     found = tfarm.export(held, GAINS, what="plant", form="fmu", folder=tmp_path)
-    assert found.details.modes == simulated_run(Case(held, GAINS, IDEAL), "step", 3.0).used.modes
+    assert found.details.modes == simulate_scenario(Case(held, GAINS, IDEAL), "step", 3.0).used.modes
 
 
 @EVERY
@@ -427,7 +427,7 @@ def test_fmpy_simulates_the_slew(tmp_path, case):
     fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: extra fmu")
     arm, law, chain, _ = LOOPS[case]
     tfarm.export(arm, law, what="loop", form="fmu", folder=tmp_path, chain=chain, anyway=True)
-    truth = simulated_run(Case(arm, law, chain), "slew", 3.0).simulation
+    truth = simulate_scenario(Case(arm, law, chain), "slew", 3.0).simulation
     inputs = {"time": truth.t} | inputs_of(truth.scenario)
     table = np.array(list(zip(*inputs.values(), strict=True)), dtype=[(name, float) for name in inputs])
     found = fmpy.simulate_fmu(str(tmp_path / "loop.fmu"), stop_time=3.0, input=table)

@@ -64,7 +64,7 @@ def some_arm(rng):
         name="planted",
     )
     zeta = 10 ** rng.uniform(-2.7, -1.7)
-    return arm.having(damping=2 * zeta / first_frequency(arm))
+    return arm.with_numbers(damping=2 * zeta / first_frequency(arm))
 
 
 def elements_response(arm, omega, pairs):
@@ -110,7 +110,7 @@ def geared(rng, arm):
         friction=J * w1 * some(0.5, -4, -1),
     )  # fmt: skip
     clamp = arm.clamp if rng.random() < 0.5 else tfarm.RotarySpring()
-    arm = replace(arm, hub=hub, clamp=clamp).having(damping=arm.damping * some(1, -2, 0))
+    arm = replace(arm, hub=hub, clamp=clamp).with_numbers(damping=arm.damping * some(1, -2, 0))
     if rng.random() < 0.6:
         return arm
     N, R = 10 ** rng.uniform(0, 2), 10 ** rng.uniform(-1, 1)
@@ -202,7 +202,7 @@ def planted_pair(rng):
     payload = tfarm.Payload() if by_ratio else tfarm.Payload(mass=link.rhoA * arm.length * rng.uniform(0.1, 1))
     arm = tfarm.Arm(link=link, hub=tfarm.Hub(inertia=inertia), payload=payload, name="pair")
     w1 = first_frequency(arm)
-    arm = arm.having(damping=2 * 10 ** rng.uniform(-2.5, -1.7) / w1)
+    arm = arm.with_numbers(damping=2 * 10 ** rng.uniform(-2.5, -1.7) / w1)
     omega = np.geomspace(0.2 * w1, 12 * w1, POINTS)
     pair = ("tip_acceleration", "hub_angle") if by_ratio else PAIRS[int(rng.integers(1, len(PAIRS)))]
     (H,) = elements_response(arm, omega, [pair])

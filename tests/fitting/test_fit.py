@@ -134,7 +134,7 @@ def test_a_decay_is_of_a_mode_that_rings():
     """Its eigenvalue is that followed from the undamped mode; overdamped there is none."""
     followed = tfarm.damped_modes(tfarm.modes(LAB, 2)).eigenvalues[-1, 0]
     assert eigenvalue(LAB, 2) == pytest.approx(followed, rel=1e-12)
-    assert "does not ring" in str(refusal(eigenvalue, LAB.having(damping=1.0), 1, kind=tfarm.ConvergenceError))
+    assert "does not ring" in str(refusal(eigenvalue, LAB.with_numbers(damping=1.0), 1, kind=tfarm.ConvergenceError))
 
 
 def test_noise_by_its_coherence_and_by_its_scatter():
@@ -155,7 +155,7 @@ def test_noise_by_its_coherence_and_by_its_scatter():
 def test_a_value_of_0_with_a_coherence_has_no_weight():
     """A line that was lost on the way, 0 with the coherence of its neighbours: the fit is that without it."""
     omega = OMEGA[::4]
-    values = tfarm.transfer(LAB.having(hub_inertia=1.1 * LAB.hub_inertia), "root_moment")(1j * omega)
+    values = tfarm.transfer(LAB.with_numbers(hub_inertia=1.1 * LAB.hub_inertia), "root_moment")(1j * omega)
     lost = np.arange(omega.size) == 12
     found = []
     for w, H in ((omega, np.where(lost, 0.0, values)), (omega[~lost], values[~lost])):
@@ -190,7 +190,7 @@ def test_resonances_before_and_after_are_the_arms_own():
     start = {"link.youngs_modulus": 6e10}
     found = fit(LAB, measured(), free=["link.youngs_modulus"], start=start, profile=False)
     free = tfarm.modes(found.arm, 6).natural_frequency[1:] / 2 / math.pi
-    locked = tfarm.modes(found.arm.having(hub_inertia=math.inf), 6).natural_frequency / 2 / math.pi
+    locked = tfarm.modes(found.arm.with_numbers(hub_inertia=math.inf), 6).natural_frequency / 2 / math.pi
     for before, after, peak in found.resonances:
         own = min([*free, *locked], key=lambda f: abs(f - after))
         assert after == pytest.approx(own, rel=2e-3)  # w of an eigenvalue, damped

@@ -133,5 +133,5 @@ def test_the_command_ends_with_3_and_names_the_remedy(tmp_path, capsys):
     assert "misses the data" in out
     assert "a free gain (--free gain): " in out
     locked = tmp_path / "locked.toml"
-    locked.write_text(to_toml(LAB.having(hub_inertia=math.inf)))
+    locked.write_text(to_toml(LAB.with_numbers(hub_inertia=math.inf)))
     assert "drives no locked hub" in refused(capsys, given[0], str(locked), *given[2:])

@@ -246,10 +246,10 @@ def test_residues_are_those_by_the_derivative():
         (LAB, "tip_acceleration", "tip_acceleration", "a signal over itself is 1"),
         (LAB, "strain@0.05", "hub_rate", "link.section.shape"),
         (LAB, "moment", "hub_rate", "moment.x is missing"),
-        (LAB.having(hub_inertia=math.inf), "root_moment", "hub_torque", "drives no locked hub"),
+        (LAB.with_numbers(hub_inertia=math.inf), "root_moment", "hub_torque", "drives no locked hub"),
         (LAB, "moment@9", "hub_rate", "a point of the arm lies between"),
         (LAB, "root_moment", "motor_voltage", "motor"),
-        (LAB.having(payload_mass=math.inf), "root_moment", "tip_acceleration", "it is held"),
+        (LAB.with_numbers(payload_mass=math.inf), "root_moment", "tip_acceleration", "it is held"),
     ],
 )
 def test_signals_that_the_arm_does_not_have_are_refused(arm, output, input, message):

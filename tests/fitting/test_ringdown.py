@@ -156,7 +156,7 @@ def held(offset):
     mass, length = RIG.payload.mass, RIG.length
     own = ABOUT_AXIS - mass * (length + offset) ** 2
     load = replace(RIG.payload, offset=offset, inertia=own)
-    return replace(RIG, payload=load).having(hub_inertia=math.inf)
+    return replace(RIG, payload=load).with_numbers(hub_inertia=math.inf)
 
 
 def first(offset):

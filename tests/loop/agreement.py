@@ -34,7 +34,7 @@ def some_free_arm(rng, damped):
     arm = some_arm(rng, case, damping=0.0, slenderness=(5, 60))
     beam = arm.link.rhoA * arm.link.length**3 / 3
     arm = replace(arm, hub=Hub(inertia=beam * float(5 ** rng.uniform(-1, 1))))
-    return arm.having(damping=float(10 ** rng.uniform(-2.7, -0.7)) / hub_units(arm)[1]) if damped else arm
+    return arm.with_numbers(damping=float(10 ** rng.uniform(-2.7, -0.7)) / hub_units(arm)[1]) if damped else arm
 
 
 def some_gains(rng, arm, number):

@@ -31,7 +31,7 @@ def window_arm() -> Arm:
 
 def held(C=1e-4) -> Arm:
     """The lab arm with its tip pinned: no rigid-body mode, a static stiffness."""
-    return tfarm.load("sasaki2012-lab").having(damping=C, payload_mass=math.inf)
+    return tfarm.load("sasaki2012-lab").with_numbers(damping=C, payload_mass=math.inf)
 
 
 def held_stiffness(arm) -> float:
@@ -53,7 +53,7 @@ def some_loop(rng, *, damping=None, slenderness=(5, 100)) -> tuple[Arm, HubFeedb
     arm = some_arm(rng, case, damping=0.0, slenderness=slenderness)
     inertia, omega = hub_units(arm)
     if damping is None and rng.random() < 0.5:
-        arm = arm.having(damping=float(10 ** rng.uniform(-4, -0.7)) / omega)
+        arm = arm.with_numbers(damping=float(10 ** rng.uniform(-4, -0.7)) / omega)
     K1 = rng.choice([0.0, 1.0, -1.0], p=(0.15, 0.65, 0.2)) * inertia * omega * 10 ** rng.uniform(-3, 1)
     K2 = rng.choice([rng.uniform(-1, 1.5), -(10 ** rng.uniform(0, 1.5)), 0.0], p=(0.6, 0.3, 0.1))
     Kp = rng.choice([0.0, 1.0, -1.0], p=(0.66, 0.24, 0.1)) * inertia * omega**2 * 10 ** rng.uniform(-3, 0)

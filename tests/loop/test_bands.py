@@ -144,7 +144,7 @@ def test_discs_hold_the_terms_of_the_loop(arm, chain):
             off = abs((1 - 1 / z) ** order * terms[row] / gain * z**-loop.in_z.poles.size - disc.middle[arcs])
             is_middle = np.isscalar(share) and arm in (LAB, BRAKED)  # of the others the terms themselves lose digits
             assert (off <= (1e-8 * abs(disc.middle[arcs]) if is_middle else disc.radius[arcs])).all()
-        circle.count(loop.having("K2", 1.1).weights)
+        circle.count(loop.with_number("K2", 1.1).weights)
     assert circle.low.size > circle.first_arcs
 
 

@@ -78,7 +78,7 @@ def test_poles_of_a_delayed_integrator_are_those_of_the_lambert_function():
     J = 1e6
     arm = replace(LAB, hub=replace(LAB.hub, inertia=J))
     K, tau = 1.5 * J, 2.0
-    poles = poles_below(loop_of(arm, Law({"hub_rate": K}, delay=tau)), 12.0).moving
+    poles = poles_below(loop_of(arm, Law({"hub_rate": K}, delay=tau)), 12.0).nonzero
     expected = np.array([lambertw(-K * tau / J, n) / tau for n in range(-4, 5)])
     for pole in poles:
         assert abs(expected - pole).min() < 1e-5 * abs(pole)  # the link's share of the inertia: 1e-6 of it
@@ -215,7 +215,7 @@ def test_a_law_stable_on_two_modes_drives_the_third():
 @pytest.mark.parametrize(("C", "most"), [(1e-3, 9), (2e-2, 12)])
 def test_models_of_a_strongly_damped_arm_have_no_poles_of_higher_modes(C, most):
     """A search of nine modes has all of them at the first C; one of twelve at the second leaves real poles to none."""
-    arm, law = LAB.having(damping=C), Law({"hub_angle": 1.0, "root_moment": -2.0})
+    arm, law = LAB.with_numbers(damping=C), Law({"hub_angle": 1.0, "root_moment": -2.0})
     found = tfarm.spill(arm, law, most)
     for number in (1, 2, 4, 7):
         A, B, C, D = sensed_model(arm, law.signals, number)
@@ -242,7 +242,7 @@ def test_spillover_in_words(name):
     unstable, poles, words = FOUND[name]
     loop = SimpleNamespace(arm=LAB)
     verdict = SimpleNamespace(
-        poles=SimpleNamespace(moving=np.array(poles, complex)), loop=loop, band=300.0, word="stable",
+        poles=SimpleNamespace(nonzero=np.array(poles, complex)), loop=loop, band=300.0, word="stable",
         is_known_beyond=False,
     )  # fmt: skip
     found = Spill(verdict, np.arange(1, 4), np.array(unstable), np.array([-1.0, 1 - 2j, 2.0]))
@@ -342,7 +342,7 @@ def test_counts_are_those_of_full_searches(vary, x, y, points):
 
 def test_the_impedance_matching_gain_of_a_massless_hub_moves_a_pole_to_infinity():
     """At C = 0 a hub without inertia feels the impedance of an endless beam far right: I sqrt(E rho)."""
-    arm = BARE.having(hub_inertia=0.0)
+    arm = BARE.with_numbers(hub_inertia=0.0)
     far = np.array([1e6, 1e7, 1e8], complex) * tfarm.modes(arm, 1).natural_frequency[1]
     drive, (_, rate, _), _ = loop_of(arm, Law({"hub_rate": 1.0})).signals.parts(far)
     assert through_infinity(drive, rate) == -1  # right of the axis at smaller gains alone, farther right

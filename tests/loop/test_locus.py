@@ -57,8 +57,8 @@ RANGES = [
     (LAB, HubFeedback(K1=0.3, K2=0.3, Kp=3.0), "all", -2.0, 2.0),
     (LAB, HUB, "payload_mass", 0.0, 2.0),
     (PAPER, HUB, "hub_inertia", 0.01, 2.0),
-    (LAB, HUB, "length", 0.4, 1.2),
     (PAPER, HUB, "damping", 0.0, 1e-3),
+    (LAB, HUB, "length", 0.4, 1.2),
     (PLASTIC, HubFeedback(K1=10.9, K2=-0.39), "all", 0.0, 2.0),
     (RUBBING, HubFeedback(K1=0.5, K2=0.3), "Kp", -2.0, 20.0),
     (RUBBING, HubFeedback(K1=0.5, K2=0.3), "K2", -1.0, 0.9),
@@ -175,7 +175,7 @@ def test_without_a_law_both_ends_are_the_arms_own_modes(arm, vary):
     start, stop = CHANGED[vary]
     found = locus(arm, HubFeedback(), vary, start, stop, 15, 8)
     for end, value in ((0, start), (-1, stop)):
-        table = tfarm.modes(arm.having(**{vary: value}), 6)
+        table = tfarm.modes(arm.with_numbers(**{vary: value}), 6)
         expected = damped_modes(table).eigenvalues[:, 0] if table.arm.link.damping else 1j * table.natural_frequency
         assert np.all(abs(found.branches[1:, end] - expected) <= 50 * EPS * abs(expected))
 
@@ -183,7 +183,7 @@ def test_without_a_law_both_ends_are_the_arms_own_modes(arm, vary):
 def test_the_circuits_pole_and_the_turning_hubs_are_one_pair_at_a_high_gain():
     """A motor under a high gain rings: a real pole from -K1/J and one from -R/L_a meet, and part as a pair."""
     arm = RIGS["back-EMF"]
-    law = default_gains(arm).having("K2", 0.0)
+    law = default_gains(arm).with_number("K2", 0.0)
     found = locus(arm, law, "K1", 0.0, 3000 * law.K1, points=301, branches=6)
     assert found.mode.tolist() == [0, 0, 0, 1, 2, 3]
     turning, circuit = found.branches[1:3]
@@ -231,7 +231,7 @@ LINES = {  # arm, law, what varies, ends, values
     "rate": (LAB, HubFeedback(), "K1", -3.0, 3.0, 200),
     "angle": (LAB, K1, "Kp", -5.0, 5.0, 200),
     "static": (LAB, HubFeedback(), "K2", 0.5, 5.0, 200),
-    "friction": (RIGS["friction"], default_gains(RIGS["friction"]).having("Kp", 0.3), "all", -2.0, 2.0, 41),
+    "friction": (RIGS["friction"], default_gains(RIGS["friction"]).with_number("Kp", 0.3), "all", -2.0, 2.0, 41),
     "a law, two values": (DEEP, Law({"hub_rate": 1.0, "root_moment": ([-13.0], [1.0])}), "root_moment", -14.0, -7.0, 2),
 }
 
@@ -257,7 +257,7 @@ def test_crossings_are_those_of_the_line_of_laws(name):
 
 def test_at_no_damping_every_mode_crosses_at_once():
     """At C = 0 (Lyapunov): all flexible modes at K2 = 1, where they are those of the locked hub; all at K1 = 0."""
-    assert not locus(DEEP.having(damping=0.0), HubFeedback(K1=1.0), "K2", -14.0, -6.0, 5, 9).crossings
+    assert not locus(DEEP.with_numbers(damping=0.0), HubFeedback(K1=1.0), "K2", -14.0, -6.0, 5, 9).crossings
     found = locus(PAPER, K1, "K2", 0.8, 1.1, 31, 9).crossings
     locked = tfarm.modes(replace(PAPER, hub=Hub(inertia=math.inf)), 7).natural_frequency
     assert [each.direction for each in found] == ["unstable"] * 7
@@ -302,16 +302,16 @@ def test_a_real_pole_passes_through_0_at_its_closed_form(name):
     here = np.flatnonzero(abs(found.gain - expected) < 1e-12)
     if here.size and arm is MASSED:  # a pole at 0 has no digits to be followed by; the others are there
         row = found.branches[:, here[0]]
-        sides = [poles_below(loop_of(arm, law.having(vary, 1.0 + side * 1e-7)), 200.0).values for side in (-1, 1)]
+        sides = [poles_below(loop_of(arm, law.with_number(vary, 1.0 + side * 1e-7)), 200.0).values for side in (-1, 1)]
         assert (row == 0).sum() == 1
         for pole in row[row != 0]:
             assert pole == pytest.approx(np.mean([side[abs(side - pole).argmin()] for side in sides]), rel=1e-6)
 
 
 def test_crossings_are_where_a_delay_takes_the_phase_margin():
-    for law, start in ((LAW.having("delay", 0.0), 0.0005), (HUB, 0.001)):
+    for law, start in ((LAW.with_number("delay", 0.0), 0.0005), (HUB, 0.001)):
         first = tfarm.locus(LAB, law, "delay", start, 0.02, 8, 2).crossings[0]
-        late = law.having("delay", start) if law is not HUB else law
+        late = law.with_number("delay", start) if law is not HUB else law
         margin = tfarm.margins(LAB, late).in_band
         assert first.direction == "unstable"
         assert first.gain == pytest.approx((start if law is not HUB else 0.0) + margin.delay, rel=1e-6)
@@ -350,7 +350,7 @@ def test_a_reduced_locus_includes_the_unobservable_pole_at_0(vary):
 
 def ratio_at(value):
     """Of the exact pole that swings most slowly at a K1, from the complete list in a box."""
-    poles = tfarm.closed_loop_poles(LAB, default_gains(LAB).having("K1", value), 8).values
+    poles = tfarm.closed_loop_poles(LAB, default_gains(LAB).with_number("K1", value), 8).values
     swinging = poles[poles.imag > 0]
     return float(damping_ratios(swinging[[np.argmin(abs(swinging))]])[0])
 

@@ -83,10 +83,10 @@ def test_a_pole_of_the_elements_crosses_at_each_edge(name):
 @pytest.mark.parametrize("name", thinned(RIGS, 4))
 def test_verdict_windows_and_map_follow_the_edges(name):
     arm = RIGS[name]
-    law = default_gains(arm).having("K2", 0.0)
+    law = default_gains(arm).with_number("K2", 0.0)
     gains, _ = edges_of(arm)
     high = gains[gains > 0].min()
-    inside = law.having("K2", 0.999 * high)
+    inside = law.with_number("K2", 0.999 * high)
     found = margins(arm, inside)
     assert found.stability.word == "stable"
     assert not found.stability.is_known_beyond
@@ -96,7 +96,7 @@ def test_verdict_windows_and_map_follow_the_edges(name):
     assert found.in_band.gain[1] == pytest.approx(high / inside.K2, rel=DIFFERENCE)
     assert nyquist_of(found.stability).unstable_by_nyquist == 0
     assert not lyapunov(loop_of(arm, inside)).proven
-    assert verdict_of(arm, law.having("K2", 1.001 * high)).word == "unstable"
+    assert verdict_of(arm, law.with_number("K2", 1.001 * high)).word == "unstable"
     plane = gain_map(arm, np.array([0.1, 1.0]) * law.K1, np.array([0.0, 0.5, 0.999, 1.001]) * high)
     assert plane.unstable.tolist() == [[n, n] for n in (0, 0, 0, 2)]
     ((low, top),) = plane.stable_intervals[-1]
@@ -172,7 +172,7 @@ def test_of_a_hub_without_inertia_nothing_below_its_losses_is_called_stable(seed
     With damping in the links no other pole is on the right: the map has none in its band, and is not stable.
     """
     arm = some_rig(np.random.default_rng(seed))
-    arm = arm.having(damping=damping) if damping else arm
+    arm = arm.with_numbers(damping=damping) if damping else arm
     assert arm.hub_side_inertia == 0 < arm.rate_loss
     b, unit = arm.rate_loss, abs(tfarm.default_gains(arm).K1)
     law = HubFeedback(K1=0.5 * unit, K2=0.3 * arm.input_per_torque)
@@ -180,6 +180,6 @@ def test_of_a_hub_without_inertia_nothing_below_its_losses_is_called_stable(seed
     found = gain_map(arm, np.array([-b - 0.3 * unit, 0.5 * unit]), np.array([-1.3, 0.3]) * arm.input_per_torque)
     assert not found.stable[:, 0].any()
     s = tfarm.modes(arm, 12).natural_frequency[-1] * np.geomspace(1.0, 1e15, 61) + 0j
-    L = loop_of(arm, law.having("K1", -3.0 * b)).loop_function(s)
+    L = loop_of(arm, law.with_number("K1", -3.0 * b)).loop_function(s)
     if not arm.clamp.damping:  # or else that is lost in the clamp too
         assert (1 + L).real.min() < 0 < (1 + L).real.max()  # it changes its sign: there is a real pole on the right

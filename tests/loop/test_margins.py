@@ -138,7 +138,7 @@ def test_what_nothing_bounds_beyond_the_band_is_not_called_exact() -> None:
 
 def test_resonances_too_narrow_for_any_grid_bound_the_exact_delay_margin() -> None:
     """With C = 1e-10 s modes 13 to 19 of the paper's arm ring through |L| = 1; by the product of 4x4 matrices."""
-    arm = BARE.having(damping=1e-10)
+    arm = BARE.with_numbers(damping=1e-10)
 
     def minus_L(omega: float) -> complex:
         rate, moment = (complex(each) for each in transition(arm, 1j * omega, ("hub_rate", "root_moment"), 20).values())
@@ -339,7 +339,7 @@ def test_without_losses_no_law_is_quiet_however_little_it_feeds_back(monkeypatch
 
 def test_models_that_nothing_damps_are_not_unstable_by_rounding():
     """Their poles are at up to 6e4 rad/s, and right of the axis by some last digits."""
-    arm = tfarm.load("stocky-steel").having(damping=0.0)
+    arm = tfarm.load("stocky-steel").with_numbers(damping=0.0)
     found = tfarm.spill(arm, Law({"hub_angle": 1.0, "root_moment": 0.3}), 4)
     assert found.rightmost.real.max() > 0
     assert found.unstable.tolist() == [0] * 4

@@ -16,6 +16,7 @@ from tests.survey import tally
 from tfarm import HubFeedback, Law
 from tfarm.arm.law_tables import load_weights
 from tfarm.arm.weights import weights_of
+from tfarm.arm.writing import to_toml
 from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, pulse_transfer
 from tfarm.dsp.discretise import discretise_law
@@ -88,7 +89,7 @@ def test_no_dense_value_is_above_the_bound_nor_more_than_a_thousandth_below(size
 
 def test_poles_that_decay_within_a_sample_respond_with_the_moments_of_their_residues():
     """Damping of a tenth of critical and 1 ms: bending modes left of the line, by the sum over them."""
-    arm, sampling = LAB.having(damping=3e-4), Sampling(period=0.001, delay_samples=0.3)
+    arm, sampling = LAB.with_numbers(damping=3e-4), Sampling(period=0.001, delay_samples=0.3)
     band = sampled_verdict(Case(arm, GAINS, Chain(sampling=sampling))).band
     found = left_response(band.loop, band.line, band.top)
     plant = band.loop.plant
@@ -151,7 +152,7 @@ def test_an_integrator_is_allowed_where_the_function_is_0_at_rest():
 
 
 def test_an_unstable_loop_has_an_infinite_norm_and_an_undamped_one_no_bound():
-    unstable = norm(LAB, GAINS.having("K2", 5.0))
+    unstable = norm(LAB, GAINS.with_number("K2", 5.0))
     assert (unstable.stability, unstable.norm.value, unstable.upper) == ("unstable", math.inf, math.inf)
     undamped = tfarm.load("quanser-flexlink")
     found = norm(undamped, tfarm.default_gains(undamped))
@@ -193,6 +194,9 @@ def test_the_command_reads_weights_of_the_controllers_file_or_of_options(tmp_pat
     other = answer(capsys, "norm", "sasaki2012-lab", "--law", str(path), "--weight", "T=1")
     assert [row["function"] for row in other["bounds"]] == ["W_T T", "stacked column"]
     assert load_weights("sasaki2012-lab") is None
+    arm = tmp_path / "arm.toml"
+    arm.write_text(f"{to_toml(LAB)}\n{path.read_text()}")
+    assert answer(capsys, "norm", str(arm))["bounds"] == of_file["bounds"]
 
 
 @pytest.mark.parametrize(

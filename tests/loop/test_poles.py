@@ -45,7 +45,7 @@ def same(ours, theirs, tolerance=1e-13) -> None:
 )
 @pytest.mark.parametrize("arm", [ARM, LAB, STOCKY, window_arm()], ids=["paper", "lab", "stocky", "window"])
 def test_the_papers_determinant_vanishes_at_fifty_digits(arm, feedback) -> None:
-    poles = closed_loop_poles(arm, feedback, 8).moving
+    poles = closed_loop_poles(arm, feedback, 8).nonzero
     assert max(newton_step(arm, complex(s), K1=feedback.K1, K2=feedback.K2, Kp=feedback.Kp) for s in poles) < 1e-14
 
 
@@ -55,13 +55,15 @@ def test_the_papers_determinant_vanishes_at_fifty_digits(arm, feedback) -> None:
 @pytest.mark.parametrize("arm", [ARM, STOCKY], ids=["paper", "stocky"])
 def test_a_lossless_loop_neither_grows_nor_decays(arm, law) -> None:
     """C = 0 and K1 = 0: even in s; K2 = 1: the locked hub's own frequencies.  Not a last bit off the axis."""
-    poles = closed_loop_poles(arm.having(damping=0.0), law, 8)
+    poles = closed_loop_poles(arm.with_numbers(damping=0.0), law, 8)
     ringing = poles.values[poles.values.imag > 0]
     assert ringing.size > 5
     assert (ringing.real == 0).all()
     assert poles.unstable == 0
     if law.K2 == 1:
-        held = tfarm.modes(replace(arm.having(damping=0.0), hub=Hub(inertia=math.inf)), ringing.size).natural_frequency
+        held = tfarm.modes(
+            replace(arm.with_numbers(damping=0.0), hub=Hub(inertia=math.inf)), ringing.size
+        ).natural_frequency
         np.testing.assert_allclose(ringing.imag, held, rtol=1e-13)
 
 
@@ -73,20 +75,20 @@ def test_counts_that_are_refused(count) -> None:
 @pytest.mark.parametrize("C", [1e-5, 1e-3])
 def test_a_list_of_fewer_than_ten_poles_ends_at_the_shear_cut_off(C) -> None:
     """A count goes on above the same poles."""
-    arm, law = STOCKY.having(damping=C), HubFeedback(K1=300.0, K2=0.3)
+    arm, law = STOCKY.with_numbers(damping=C), HubFeedback(K1=300.0, K2=0.3)
     few, ten = closed_loop_poles(arm, law), closed_loop_poles(arm, law, 10)
     assert few.ends_at_shear_cutoff
     assert not ten.ends_at_shear_cutoff
     assert 0.9 * arm.shear_cutoff < few.box.im_max <= arm.shear_cutoff
     assert few.values.size < 10 == ten.values.size
-    same(few.moving, ten.moving[ten.moving.imag < few.box.im_max], 1e-12)
+    same(few.nonzero, ten.nonzero[ten.nonzero.imag < few.box.im_max], 1e-12)
     usual = closed_loop_poles(LAB, LAW)
     assert (usual.values.size, usual.ends_at_shear_cutoff) == (10, False)
 
 
 def test_a_count_goes_on_into_shear_where_bending_is_overdamped() -> None:
     """With psi' = 0 as good as held: shear waves in a free tip's arm, pi c/L apart, c^2 = kappa G/rho."""
-    arm = ARM.having(damping=0.05)
+    arm = ARM.with_numbers(damping=0.05)
     poles = closed_loop_poles(arm, LAW, 9)
     link = arm.link
     apart = math.pi / link.length * math.sqrt(link.shear_factor * link.shear_modulus / link.density)
@@ -131,7 +133,7 @@ def far_poles(found):
 
 def test_acceleration_fed_forward_beyond_the_hubs_inertia_is_unstable_far_beyond_the_modes():
     """-2 J s^2 up to a corner takes more than all of the hub's inertia, which counts above the link's own impedance."""
-    arm = LAB.having(hub_inertia=J)
+    arm = LAB.with_numbers(hub_inertia=J)
     found = verdict_of(arm, PUSHED)
     assert (found.word, found.unstable_roots) == ("unstable", 2)
     rate = tfarm.transfer(arm, "hub_rate", method="appendix")
@@ -144,7 +146,7 @@ def test_acceleration_fed_forward_beyond_the_hubs_inertia_is_unstable_far_beyond
 @pytest.mark.parametrize(("share", "number"), [(0.5, 0), (1.5, 1)])
 def test_a_rate_gain_beyond_the_links_impedance_drives_a_pin_without_inertia(share, number):
     """The impedance of a link without losses goes to a constant; with more than that subtracted a pole is unstable."""
-    arm = BARE.having(hub_inertia=0.0)
+    arm = BARE.with_numbers(hub_inertia=0.0)
     rate = tfarm.transfer(arm, "hub_rate", method="appendix")
     impedance = 1 / complex(rate(1e12 + 0j)).real
     K1 = -share * impedance
@@ -200,7 +202,7 @@ def test_a_shorter_list_has_a_lower_box_between_its_last_pole_and_the_next():
 def test_the_rightmost_pole_is_not_one_at_0():
     poles = listed(0.0, 0.0, -3.0, -1 + 10j)
     assert poles.spectral_abscissa == -1.0
-    np.testing.assert_array_equal(poles.moving, [-3.0, -1 + 10j])
+    np.testing.assert_array_equal(poles.nonzero, [-3.0, -1 + 10j])
     assert (poles.unstable, listed(2.0, 3 + 1j, -1 + 2j).unstable) == (0, 3)
 
 
@@ -315,7 +317,7 @@ def test_the_plane_is_drawn_in_a_disc():
 @pytest.mark.parametrize(("sensor", "share"), [("displacement", 1.0), ("moment", 0.3)])
 def test_at_each_zero_of_a_sensor_its_response_vanishes(C, sensor, share):
     """The tip moves against the hub at first, so it has real ones on the right; -1/C may be below mode 1."""
-    arm = LAB.having(damping=C)
+    arm = LAB.with_numbers(damping=C)
     x = share * arm.length
     found, G = positions(arm, sensor, np.array([x]), 4), tfarm.transfer(arm, sensor, x=x)
     (zeros,) = found.zeros
@@ -352,14 +354,14 @@ def test_of_a_zero_what_is_no_more_than_its_error_is_left_out():
 
 def test_an_end_that_no_mode_moves_is_no_place_for_a_sensor():
     """The clamp of a hub without radius does not move, nor does the tip without payload bend."""
-    arm = tfarm.load("sasaki2012").having(payload_mass=0.0, payload_inertia=0.0)
+    arm = tfarm.load("sasaki2012").with_numbers(payload_mass=0.0, payload_inertia=0.0)
     x = np.linspace(0.0, arm.length, 5)
     assert sensed_places(arm, "displacement", x, 3).tolist() == x[1:].tolist()
     assert sensed_places(arm, "moment", x, 3).tolist() == x[:-1].tolist()
 
 
 def test_an_arm_that_cannot_turn_has_no_such_zeros():
-    locked = tfarm.load("sasaki2012").having(hub_inertia=math.inf)
+    locked = tfarm.load("sasaki2012").with_numbers(hub_inertia=math.inf)
     assert "an arm that cannot turn" in str(refusal(positions, locked, "moment", np.array([0.1]), 2))
 
 

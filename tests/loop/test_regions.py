@@ -107,7 +107,7 @@ def test_an_empty_or_unordered_range_is_refused(K1) -> None:
 
 def test_without_damping_the_intervals_of_a_held_arm_end_where_it_falls_statically() -> None:
     """An angle pushed away by less than the arm's own stiffness: the map's counts are the same, point by point."""
-    held = BARE.having(payload_mass=math.inf)
+    held = BARE.with_numbers(payload_mass=math.inf)
     assert held.is_undamped
     plane = gain_map(held, np.array([-0.3, 0.3]), np.linspace(-2.5, 1.9, 41), -150.0)
     for n, column in enumerate(plane.stable_intervals):

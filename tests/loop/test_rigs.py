@@ -60,19 +60,19 @@ def test_poles_are_those_of_the_elements_and_no_others(name):
         theirs = model.eigenvalues(poles.loop.gains)
         theirs = theirs[poles.box.holds(theirs) & (abs(theirs) > 1e-6 * model.a)]
         upper = theirs[theirs.imag > -1e-9 * model.a]
-        assert upper.size == poles.moving.size
-        assert all(abs(upper - pole).min() < 1e-8 * abs(pole) for pole in poles.moving)
+        assert upper.size == poles.nonzero.size
+        assert all(abs(upper - pole).min() < 1e-8 * abs(pole) for pole in poles.nonzero)
         assert int((theirs.real > 1e-9 * abs(theirs)).sum()) == poles.unstable
 
 
 def test_no_bound_is_claimed_where_elastic_links_ring_beyond_the_band():
     """A voltage behind an inductance, C = 0: with K2 < 0 modes far above the band are driven, each by very little."""
     arm = REAL["quanser-flexlink"]
-    law = default_gains(arm).having("K2", -0.015)
+    law = default_gains(arm).with_number("K2", -0.015)
     verdict = verdict_of(arm, law)
     assert "not determined beyond" in verdict.tail
     beyond = poles_below(loop_of(arm, law), 3e4)
-    driven = beyond.moving[beyond.moving.real > 1e-12 * abs(beyond.moving)]
+    driven = beyond.nonzero[beyond.nonzero.real > 1e-12 * abs(beyond.nonzero)]
     assert driven.size
     assert driven.imag.min() > verdict.band
     theirs = RigLoop(arm, 2.5e4).eigenvalues(law)
@@ -92,7 +92,7 @@ def test_at_an_edge_of_a_window_poles_of_the_elements_cross(name, gain):
         if window.end(edge) != "edge" or at.min() > reached(arm, 30):
             continue  # no pole crosses there, or beyond what the elements have
         model, outwards = RigLoop(arm, max(reached(arm, 10), 1.5 * at.min())), np.sign(edge - law[gain])
-        inside, outside = (law.having(gain, edge + sign * outwards * 1e-3 * abs(edge)) for sign in (-1, 1))
+        inside, outside = (law.with_number(gain, edge + sign * outwards * 1e-3 * abs(edge)) for sign in (-1, 1))
         assert model.unstable(inside) == 0
         moved = model.eigenvalues(outside)
         moved = moved[moved.real > 1e-12 * abs(moved)]
@@ -104,7 +104,7 @@ def test_at_an_edge_of_a_window_poles_of_the_elements_cross(name, gain):
 def test_the_sampled_loop_is_that_of_the_elements_under_a_hold(period, K2, stable):
     """The largest |z|, of the loop stable and not, the free angle's z = 1 apart."""
     arm = REAL["bench-rig"]
-    law = default_gains(arm).having("K2", K2)
+    law = default_gains(arm).with_number("K2", K2)
     verdict = sampled_verdict(Case(arm, law, Chain(sampling=Sampling(period=period))))
     z = RigLoop(arm, reached(arm, 8)).sampled(law, period)
     radius = np.log(abs(np.delete(z, abs(z - 1).argmin())).max())
@@ -117,7 +117,7 @@ def test_the_sampled_loop_is_that_of_the_elements_under_a_hold(period, K2, stabl
 def test_more_than_the_whole_moment_drives_every_mode_behind_friction(K2):
     """Each higher band has as many more unstable poles as it has modes, two each; below the whole moment none."""
     arm = REAL["quanser-2dsfl"]
-    law = default_gains(arm).having("K2", K2 * arm.input_per_torque)
+    law = default_gains(arm).with_number("K2", K2 * arm.input_per_torque)
     verdict = verdict_of(arm, law)
     driven = K2 > 1
     assert verdict.unstable_roots_infinite == driven

@@ -148,7 +148,7 @@ def test_next_to_z_1_the_loop_goes_as_the_powers_that_are_named(arm, law):
 def test_from_the_required_damping_on_a_law_is_stable():
     law = Law({"hub_rate": ([6.0], [0.02, 1.0]), "moment@0.5": 0.2}, delay=0.004)
     found = damping_limit(sampled_verdict(Case(LAB, law)).loop, 20).figure
-    sides = [sampled_verdict(Case(LAB.having(damping=share * found.value), law)) for share in (0.999, 1.001)]
+    sides = [sampled_verdict(Case(LAB.with_numbers(damping=share * found.value), law)) for share in (0.999, 1.001)]
     assert (found.is_settled, [each.is_stable for each in sides]) == (True, [False, True])
 
 
@@ -213,7 +213,7 @@ def test_between_crossings_along_one_part_the_count_is_theirs():
         for name in loop.law.part_gains if loop else ():
             own = loop.number(name)
             values = own * np.r_[1.0, -(10 ** rng.uniform(-4, 3, 3)), 10 ** rng.uniform(-4, 3, 3)]
-            loops = [loop.having(name, value) for value in values.tolist()]
+            loops = [loop.with_number(name, value) for value in values.tolist()]
             passed = circle_crossings(loop, name).passed(values)
             counts = np.array([(each.poles.log_radius > 0).sum() for each in loops])
             assert (counts - counts[0] == passed - passed[0]).all(), name
@@ -223,7 +223,7 @@ def test_between_crossings_along_one_part_the_count_is_theirs():
 
 def test_gains_of_a_stiff_arm_have_the_jury_limits():
     """z^2 - 2z + 1 + Kp T^2 (z + 1)/2J + K1 T (z - 1)/J: Kp > 0, K1 > Kp T/2 and K1 < 2J/T."""
-    stiff = LAB.having(length=0.1)
+    stiff = LAB.with_numbers(length=0.1)
     gains = HubFeedback(K1=0.4 * stiff.turned_inertia / T, Kp=1.0)
     loop = sampled_loop(Case(stiff, gains, Chain()), count=1)
     np.testing.assert_allclose(stable_windows(loop, "Kp"), [(0.0, 2 * gains.K1 / T)], rtol=1e-2)
@@ -235,9 +235,9 @@ def test_an_angle_gain_that_is_0_lies_at_the_edge_of_its_interval():
     found = tfarm.sampled(LAB, HubFeedback(K1=14.7, K2=-0.26), Chain(), count=6)
     low, high = found.interval("Kp")
     assert (low, found.verdict.is_stable) == (0.0, True)
-    held = (found.loop.having("Kp", Kp) for Kp in (1e-3, high * 0.999))
+    held = (found.loop.with_number("Kp", Kp) for Kp in (1e-3, high * 0.999))
     assert all(each.poles.is_stable for each in held)
-    driven = replace(found, verdict=replace(found.verdict, loop=found.verdict.loop.having("K1", -0.1), band=None))
+    driven = replace(found, verdict=replace(found.verdict, loop=found.verdict.loop.with_number("K1", -0.1), band=None))
     assert driven.interval("Kp") is None  # whatever its windows
 
 
@@ -247,6 +247,6 @@ def test_only_a_part_that_one_signal_has_to_itself_has_a_name():
     assert LAWS["lead"].part_gains == {"hub_angle.gain": (0, 1.0), "root_moment": (1, 0.1)}
     law = LAWS["in z"]
     for name, (part, value) in law.part_gains.items():
-        twice = law.weighted([2.0 if place == part else 1.0 for place in range(2)])
+        twice = law.with_factors([2.0 if place == part else 1.0 for place in range(2)])
         z = np.array([0.3 + 0.4j])
-        np.testing.assert_allclose(twice.values(z), law.having(name, 2 * value).values(z), rtol=1e-14)
+        np.testing.assert_allclose(twice.values(z), law.with_number(name, 2 * value).values(z), rtol=1e-14)

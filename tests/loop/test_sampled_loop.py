@@ -74,7 +74,7 @@ SIZE = 1e-4  # of a gain: the difference over both signs is right to its square,
 
 def added(loop, by):
     """What a gain of that name alone adds to ln|z| of each listed mode, by the loop's own poles at a tiny gain."""
-    less, more = (loop.times(0.0).having(by, sign * SIZE * loop.number(by)).poles for sign in (-1, 1))
+    less, more = (loop.times(0.0).with_number(by, sign * SIZE * loop.number(by)).poles for sign in (-1, 1))
 
     def largest(poles, n):
         return poles.log_radius[poles.mode == n].max()
@@ -145,7 +145,7 @@ def found():
 def test_each_point_of_a_locus_is_a_pole_of_its_loop(found):
     for name, drawn in found.by.items():
         for n in range(0, drawn.values.size, drawn.values.size // 4):
-            poles = found.loop.having(name, float(drawn.values[n])).poles.z
+            poles = found.loop.with_number(name, float(drawn.values[n])).poles.z
             listed = drawn.z[n][np.isfinite(drawn.z[n])]
             assert max(abs(poles - z).min() for z in listed) < 1e-9
     assert found.half_rate == 50.0
@@ -156,7 +156,7 @@ def test_each_point_of_a_locus_is_a_pole_of_its_loop(found):
 def test_a_branch_is_named_after_the_mode_whose_pole_it_leaves(found):
     """With next to no gain, which moves a pole by less than 1e-4, both branches of a mode lie at e^{pT} of its pair."""
     eigenvalues = tfarm.damped_modes(tfarm.modes(LAB, 6)).eigenvalues
-    alone = sampled_locus(found.loop.having("K2", 0.0), "K1", np.geomspace(1e-3, STRONGER, 31) * GAINS.K1)
+    alone = sampled_locus(found.loop.with_number("K2", 0.0), "K1", np.geomspace(1e-3, STRONGER, 31) * GAINS.K1)
     start, mode = alone.z[0], alone.mode
     for number, pair in zip(range(1, 7), eigenvalues[-6:], strict=True):
         mine = np.sort_complex(start[mode == number])

@@ -17,6 +17,7 @@ from tests.shared import circle_crossings, thinned
 from tests.similar import EITHER
 from tfarm import HubFeedback, Law, modes
 from tfarm.arm import as_law
+from tfarm.arrays import MACHINE_EPS
 from tfarm.case import Case
 from tfarm.dsp import Chain, Converters, Sampling
 from tfarm.errors import ConvergenceError, ParameterError
@@ -24,6 +25,7 @@ from tfarm.loop.circle_crossings import ends_of_K1, interval_around, sampled_map
 from tfarm.loop.edges import DelayMargin, Figure, delay_margin, required_damping
 from tfarm.loop.sampled import sampled_loop
 from tfarm.loop.sampled_analysis import Analysis
+from tfarm.loop.sampled_poles import FADED_RADIUS
 from tfarm.loop.sampled_verdict import Verdict, sampled_verdict
 from tfarm.schema import text, to_dict
 from tfarm.spectrum.gains import default_gains
@@ -34,7 +36,7 @@ room = import_module("tfarm.loop.sampled_verdict")
 
 def stable_at(loop, name, values):
     """Whether all poles lie inside the circle at each value of a gain."""
-    return [loop.having(name, float(value)).poles.is_stable for value in values]
+    return [loop.with_number(name, float(value)).poles.is_stable for value in values]
 
 
 @pytest.mark.parametrize("period", [0.005, 0.05])
@@ -63,10 +65,10 @@ def test_where_the_feedback_outweighs_no_fast_modes_damping_all_delays_are_looke
 def test_a_long_delay_hides_no_crossing_between_two_points_of_the_grid(lab):
     """Sixty samples turn the loop's phase sixty times round the circle; a grid ten times coarser loses a pair."""
     loop = sampled_loop(Case(lab, GAINS, Chain(sampling=Sampling(delay_samples=60.0))), count=6)
-    found = circle_crossings(loop.having("K1", 0.0).having("K2", 0.3), "K1")
+    found = circle_crossings(loop.with_number("K1", 0.0).with_number("K2", 0.3), "K1")
     edges = found.gain[np.diff(found.gain, append=np.inf) > 1e-6]
     middles = np.r_[edges[0] - 1, (edges[1:] + edges[:-1]) / 2, edges[-1] + 1]
-    counts = [(loop.having("K1", middle).poles.log_radius > 0).sum() for middle in middles]
+    counts = [(loop.with_number("K1", middle).poles.log_radius > 0).sum() for middle in middles]
     np.testing.assert_array_equal(counts - found.passed(middles), counts[0])
 
 
@@ -90,7 +92,7 @@ def test_the_required_damping_is_where_the_verdict_turns(lossless):
     C = required_damping(Case(lossless, GAINS, Chain()), count=20)
     growth, w = sampled_verdict(Case(lossless, GAINS)).log_radius, tfarm.modes(lossless, 13).natural_frequency[13]
     assert pytest.approx(2 * growth / (0.01 * w**2), rel=0.02) == C
-    arms = [lossless.having(damping=each * C) for each in (1, 1 - 4e-6)]
+    arms = [lossless.with_numbers(damping=each * C) for each in (1, 1 - 4e-6)]
     assert [sampled_loop(Case(arm, GAINS, Chain())).poles.is_stable for arm in arms] == [True, False]
 
 
@@ -100,7 +102,7 @@ def test_a_required_damping_next_to_overdamped_modes_is_that_of_a_loop_with_all_
     case = Case(lossless, HubFeedback(K1=K1, K2=K2))
     C = required_damping(case)
     assert ratio / 10 < C * tfarm.modes(lossless, 1).natural_frequency[1] / 2 < ratio
-    arms = [lossless.having(damping=C * side) for side in (1 - 1e-4, 1 + 1e-4)]
+    arms = [lossless.with_numbers(damping=C * side) for side in (1 - 1e-4, 1 + 1e-4)]
     radii = [abs(sampled_loop(case.on(arm), count=20).eigenvalues).max() for arm in arms]
     assert radii[0] > 1 > radii[1]
 
@@ -113,7 +115,10 @@ def test_the_region_is_upright_where_intervals_of_the_rate_gain_end(lab):
     assert ends.size
     assert (ends > 0).all()
     for end in ends.tolist():
-        loops = [[loop.having("K2", K2).having("K1", end * (1 + way)) for way in (-1e-5, 1e-5)] for K2 in moment_gains]
+        loops = [
+            [loop.with_number("K2", K2).with_number("K1", end * (1 + way)) for way in (-1e-5, 1e-5)]
+            for K2 in moment_gains
+        ]
         assert any((abs(a.eigenvalues).max() < 1) != (abs(b.eigenvalues).max() < 1) for a, b in loops)
 
 
@@ -123,7 +128,7 @@ def test_no_damping_cures_some_loops_and_none_is_needed_for_few_modes(lossless):
     assert required_damping(Case(lossless, GAINS, Chain()), count=6) == 0.0
     case = draw(63, 531)
     chain = Chain(sampling=Sampling(period=2 * math.pi / case.first / 9))
-    strongest = case.arm.elastic.having(damping=0.3 / case.first)
+    strongest = case.arm.elastic.with_numbers(damping=0.3 / case.first)
     radii = [abs(sampled_loop(Case(strongest, case.law, chain), count=n).eigenvalues).max() for n in (1, 20)]
     assert radii[0] < 1 < radii[1]
     assert required_damping(Case(case.arm.elastic, case.law, chain)) == np.inf
@@ -187,13 +192,13 @@ def some_sampled(seed):
 
 
 def answers(arm, law, chain, units):
-    """Intervals of K1 and K2 in units of the law's, delay margin, poles in z; None where modes are not determined."""
+    """Intervals of K1 and K2 in units of the law's, delay margin, poles; None where modes are not determined."""
     try:
         loop = sampled_loop(Case(arm, law, chain), count=6)
     except ConvergenceError:
         return None
     windows = [np.array(stable_windows(loop, name)) / units[name] for name in ("K1", "K2")]
-    return windows, delay_margin(loop), loop.poles.z
+    return windows, delay_margin(loop), loop.poles
 
 
 SEEDS = [STILL_RIG, *((6, n) for n in range(24))]
@@ -215,7 +220,11 @@ def test_a_sampled_loop_has_the_same_windows_delay_and_poles(seed, units):
         np.testing.assert_allclose(theirs, mine, rtol=1e-6)
     assert there[1].samples == pytest.approx(here[1].samples, abs=1e-6)
     assert there[1].is_bound == here[1].is_bound
-    assert abs(there[2][:, None] - here[2]).min(axis=1).max() < 1e-9
+    # Overdamped modes are fitted by least squares without singular values below 1e-12: rounding changes their shares by
+    # EPS/1e-12, and a pole that such a share moves by less than FADED_RADIUS by that part of it.
+    is_fitted = (abs(there[2].z) < FADED_RADIUS) & (there[2].mode == 0)
+    tolerance = np.where(is_fitted, FADED_RADIUS * MACHINE_EPS / 1e-12, 1e-9)
+    assert (abs(there[2].z[:, None] - here[2].z).min(axis=1) < tolerance).all()
 
 
 def test_an_arm_that_something_holds_has_its_whole_window():
@@ -252,7 +261,7 @@ def test_the_count_at_a_point_is_that_of_the_poles_of_its_own_loop(law, chain, v
     assert plane.vary == vary
     counts = []
     for i, j in [(i, j) for i in range(4) for j in range(4) if (i + j) % 2]:
-        there = as_law(law).having(vary[0], x[i]).having(vary[1], y[j])
+        there = as_law(law).with_number(vary[0], x[i]).with_number(vary[1], y[j])
         poles = sampled_loop(Case(LAB, there, chain), count=6).poles
         counts.append(int((abs(poles.z) > 1).sum()))
         assert (plane.unstable[i, j], plane.counts[j, i]) == (counts[-1], counts[-1])

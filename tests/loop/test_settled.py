@@ -104,7 +104,7 @@ def test_the_count_does_not_depend_on_the_arcs_to_begin_with(lab, coarser):
     band = complete_band(loop)
     circle = Circle(band.loop, band.kept, band.missing, 64 // coarser)
     for K2 in (0.3, -0.05, 1.3):
-        other = loop.having("K1", 0.3).having("K2", K2)
+        other = loop.with_number("K1", 0.3).with_number("K2", K2)
         assert circle.count(other.weights) == (other.poles.log_radius > 0).sum()
 
 
@@ -122,7 +122,7 @@ def test_the_count_is_that_of_the_eigenvalues_outside_odd_ones_too(lab, K1, K2, 
 @pytest.mark.parametrize(("damping", "K2", "off"), thinned([(0.3, 0.3, 1e-5), (0.3, 1.5, 1e-5), (12.0, 0.3, 0.05)], 3))
 def test_far_beyond_critical_one_mode_shows_what_a_hold_model_does(lab, damping, K2, off):
     """Eleven and 429 times critical in the first mode: its slow pole, and the remainder near -1/C."""
-    arm, gains = lab.having(damping=damping), HubFeedback(K1=0.3, K2=K2)
+    arm, gains = lab.with_numbers(damping=damping), HubFeedback(K1=0.3, K2=K2)
     verdict = sampled_verdict(Case(arm, gains))
     assert (verdict.modes_used, verdict.is_stable) == (1, K2 < 1)
     assert verdict.loop.poles.log_spectral_radius == pytest.approx(HoldModel(arm, 30).log_radius(gains, Chain()), off)
@@ -170,7 +170,7 @@ def test_what_is_left_of_the_line_is_bounded_by_the_integrals_of_both_edges():
 
 def test_with_much_damping_the_band_extends_to_the_shear_waves():
     """Much damping leaves four modes of bending; what oscillates above them dies within a sample."""
-    arm = tfarm.load("sasaki2012-lab").having(damping=1e-3)
+    arm = tfarm.load("sasaki2012-lab").with_numbers(damping=1e-3)
     loop = sampled_loop(Case(arm, HubFeedback(K1=0.3, K2=0.3)), count=4)
     found, highest = complete_band(loop), loop.plant.poles.imag.max()
     assert found.top > 100 * highest

@@ -168,7 +168,7 @@ PUSHES = Law({"hub_angle": ([-SPRING], [1e-2, 1.0])})
 
 @pytest.mark.parametrize(("more", "verdict"), [(0.0, "marginal"), (1e-6, "unstable"), (-1e-6, "stable")])
 def test_a_law_as_stiff_as_the_spring_has_its_pole_at_0_and_none_next_to_it(more, verdict):
-    for law in (HubFeedback(Kp=-SPRING * (1 + more)), PUSHES.having("gain", 1 + more)):
+    for law in (HubFeedback(Kp=-SPRING * (1 + more)), PUSHES.with_number("gain", 1 + more)):
         assert tfarm.margins(HELD, law).stability.word == verdict
         poles = tfarm.closed_loop_poles(HELD, law, 3)
         assert ((poles.values == 0).sum(), poles.unstable) == (more == 0, more > 0)
@@ -189,9 +189,9 @@ def test_a_map_may_have_it_among_its_points():
 
 
 def test_near_it_a_sampled_loop_has_a_delay_margin():
-    assert tfarm.sampled(HELD, PUSHES.having("gain", 1 - 1e-11)).delay_margin.is_bound
+    assert tfarm.sampled(HELD, PUSHES.with_number("gain", 1 - 1e-11)).delay_margin.is_bound
     for less in (1e-13, 1e-14, 0.0):  # rounding decides on which side of the circle it is, and is no error
-        assert tfarm.sampled(HELD, PUSHES.having("gain", 1 - less)).delay_margin.samples >= 0
+        assert tfarm.sampled(HELD, PUSHES.with_number("gain", 1 - less)).delay_margin.samples >= 0
 
 
 def law(K1=0.3, K2=0.3, Kp=0.0):
@@ -306,8 +306,8 @@ def zeros_in(arm, law, middle, radius, away=0, points=16):
 def test_each_disc_holds_one_zero_of_the_papers_determinant_and_its_neighbour_none(name):
     poles = tfarm.closed_loop_poles(LAB, LAWS[name], 5)
     law, discs = poles.loop.law, poles.certify(18)
-    assert len(discs) == poles.moving.size > 3
-    for disc, pole in zip(discs, poles.moving, strict=True):
+    assert len(discs) == poles.nonzero.size > 3
+    for disc, pole in zip(discs, poles.nonzero, strict=True):
         with mpmath.workdps(40):
             middle, radius = mpmath.mpc(disc.re, disc.im), mpmath.mpf(disc.radius)
         assert abs(complex(middle) - pole) < 1e-11 * abs(pole)
@@ -362,7 +362,7 @@ def test_friction_at_the_hub_alone_damps_every_mode_that_the_hub_takes_part_in(f
     assert (found.word, found.unstable_roots, found.is_known_beyond) == ("stable", 0, True)
     assert (found.poles.values == 0).sum() == (stiffness == 0)
     law = loop_of(BARE, HubFeedback(K1=friction, Kp=stiffness)).law
-    for pole in found.poles.moving[:: max(1, found.poles.moving.size // 6)]:
+    for pole in found.poles.nonzero[:: max(1, found.poles.nonzero.size // 6)]:
         assert pole.real < 0
         assert zeros_in(BARE, law, mpmath.mpc(pole), -pole.real / 9) == 1  # left of the axis, on which roots are cut
 

@@ -60,7 +60,7 @@ def exact_signals(arm, law, excitation, s):
         (LAB, LAW, WIDTH, 1.0),
         (LAB, SERVO, WIDTH, 1.0),
         (LAB, tfarm.HubFeedback(K1=1e-6, Kp=1e-7), WIDTH, 1.0),
-        (LAB.having(damping=2e-3), LAW, WIDTH, 1.0),
+        (LAB.with_numbers(damping=2e-3), LAW, WIDTH, 1.0),
         (LOSSLESS, LAW, WIDTH, 1.0),
         (LOSSLESS, tfarm.HubFeedback(K1=0.3, K2=0.3, Kp=3.0), WIDTH, 1.0),
         (tfarm.load("stocky-steel"), tfarm.HubFeedback(K1=77.7, K2=0.3), 0.01, 0.05),
@@ -190,7 +190,7 @@ def test_until_twice_the_delay_the_torque_is_the_laws_own_step_response(damping,
     tau, den = 0.01, np.polymul([1 / corner, 1.0], [1 / corner, 1.0] if order == 2 else [1.0])
     law = tfarm.Law({"hub_angle": ([1.0, 3.0], list(den))}, delay=tau, references=("hub_angle",))
     assert np.unique(law.poles).size == (2 if corner == 300.0 else 1)
-    found = time_response(usual_poles(loop_of(LAB.having(damping=damping), law)), NAMES, STEP, 1.0)
+    found = time_response(usual_poles(loop_of(LAB.with_numbers(damping=damping), law)), NAMES, STEP, 1.0)
     after = np.array([0.0, 1e-6, 1e-4, 5e-4, 1e-3, 3e-3, 9e-3])
     x = corner * after
     own = 3 + np.exp(-x) * (corner - 3 if order == 1 else corner * x - 3 * (1 + x))

@@ -103,7 +103,7 @@ def test_an_end_of_the_search_is_no_edge() -> None:
     found = windows(LAB, HubFeedback(K1=0.3, K2=0.3), "K2")
     assert [found.end(value) for value in found.around] == ["search bound", "edge"]
     for value in found.around:
-        poles = poles_below(loop_of(LAB, HubFeedback(K1=0.3, K2=value)), 2e3).moving
+        poles = poles_below(loop_of(LAB, HubFeedback(K1=0.3, K2=value)), 2e3).nonzero
         assert (abs(poles.real / abs(poles)).min() < 1e-12) == (found.end(value) == "edge")
     assert [windows(BARE, HubFeedback(K1=0.3), "K1").end(value) for value in (0.0, math.inf)] == ["edge", "no limit"]
     for arm in (BARE, LAB):
@@ -150,7 +150,7 @@ def holds(windows, value):
     return any(low < value < high for low, high in windows.all)
 
 
-@pytest.mark.parametrize(("law", "every"), thinned([(LAW, 3), (LAW, 1), (LAW.having("gain", 7.0), 1)], 3))
+@pytest.mark.parametrize(("law", "every"), thinned([(LAW, 3), (LAW, 1), (LAW.with_number("gain", 7.0), 1)], 3))
 def test_verdicts_turn_at_each_end(law, every):
     """Of each number of the law, or of every third one."""
     found = windows_of(verdict_of(LAB, law))
@@ -160,10 +160,10 @@ def test_verdicts_turn_at_each_end(law, every):
         for low, high in each.all:
             for end, side in ((low, 1), (high, -1)):
                 inward = side * (OFF_END if end else OFF_ZERO) * (high - low)
-                assert verdict_of(LAB, law.having(name, end + inward)).is_stable
+                assert verdict_of(LAB, law.with_number(name, end + inward)).is_stable
                 if each.end(end) == "edge":
                     edges += 1
-                    assert not verdict_of(LAB, law.having(name, end - inward)).is_stable
+                    assert not verdict_of(LAB, law.with_number(name, end - inward)).is_stable
         assert holds(each, law.numbers[name]) == (each.around is not None) == (law is LAW)
     assert edges >= 8 // every
 
@@ -183,7 +183,7 @@ def test_the_factor_on_the_law_is_its_gain_margin():
 
 
 def test_where_poles_stay_on_the_axis_there_are_none():
-    undamped = tfarm.margins(BARE, LAW.having("delay", 0.0))
+    undamped = tfarm.margins(BARE, LAW.with_number("delay", 0.0))
     assert undamped.windows == {}
     assert "undamped link" in undamped.intervals_note
     marginal = verdict_of(LAB, Law({"tip_acceleration": 0.01, "root_moment": 0.1}))  # nothing holds angle or rate
@@ -217,16 +217,16 @@ NARROW = {  # two crossings 0.15 rad/s apart, near 72 and 93, lie between neighb
 def test_a_window_has_no_unstable_stretch_inside(law, name, values):
     window = windows_of(verdict_of(LAB, law))[name]
     for value in values:
-        assert holds(window, value) == verdict_of(LAB, law.having(name, value)).is_stable
+        assert holds(window, value) == verdict_of(LAB, law.with_number(name, value)).is_stable
 
 
 @pytest.mark.parametrize(("name", "band"), [("hub_angle.gain", 90.0), ("tip_acceleration.den.0", 150.0)])
 def test_below_a_band_through_whose_top_poles_pass_each_interval_is_counted(name, band):
     """Crossings below it do not carry the count from one end of the range to the other."""
-    law = LAW.having("gain", 7.0)
+    law = LAW.with_number("gain", 7.0)
     found = windows_of(verdict_of(LAB, law, band), [name])[name]
     for value in np.linspace(*found.looked_at, 8)[1:-1].tolist():
-        count = unstable_below(loop_of(LAB, law.having(name, value)), found.band)
+        count = unstable_below(loop_of(LAB, law.with_number(name, value)), found.band)
         assert holds(found, value) == (count == 0)
 
 
@@ -238,12 +238,12 @@ def test_next_to_zero_windows_are_not_cut_by_rounding(damping) -> None:
     """
     stocky = tfarm.load("stocky-steel")
     hub = replace(stocky.hub, friction=0.3)
-    arm = replace(stocky.having(damping=damping), hub=hub, joint=RotarySpring(stiffness=1.0))
+    arm = replace(stocky.with_numbers(damping=damping), hub=hub, joint=RotarySpring(stiffness=1.0))
     law = Law({"hub_angle": ([0.03, 0.07], [1.0, 0.0])})
     found = windows_of(verdict_of(arm, law))["hub_angle.den.0"]
     probes = [*np.geomspace(1e-8, 5.0, 8), *((low + high) / 2 for low, high in found.all)]
     for value in probes:
-        count = verdict_of(arm, law.having("hub_angle.den.0", float(value)), band=found.band).unstable_roots
+        count = verdict_of(arm, law.with_number("hub_angle.den.0", float(value)), band=found.band).unstable_roots
         assert holds(found, value) == (count == 0)
 
 
@@ -258,7 +258,7 @@ def test_counts_are_not_carried_through_a_zero_leading_coefficient() -> None:
     arm, law = reproduced("lifted")
     found = windows_of(verdict_of(arm, law))["tip_acceleration.den.0"]
     for value in (-7.7, -7.4, -6.4):
-        count = verdict_of(arm, law.having("tip_acceleration.den.0", value)).unstable_roots
+        count = verdict_of(arm, law.with_number("tip_acceleration.den.0", value)).unstable_roots
         assert holds(found, value) == (count == 0)
     assert [pair[0] for pair in found.all] == [-10.0]
 

@@ -28,6 +28,7 @@ from tfarm.loop.nyquist import compress_radius
 from tfarm.plots.labels import number_label
 from tfarm.plots.regions import colours, contours
 from tfarm.spectrum.gains import default_gains
+from tfarm.synthesis.trade_off import FrontPoint, TradeOff
 from tfarm.tuner import Plan
 
 mpl.use("Agg")
@@ -36,6 +37,12 @@ LAB = tfarm.load("sasaki2012-lab")
 MICRO = Path(__file__).parents[1] / "data" / "reproductions" / "micro2.toml"
 LAW = tfarm.HubFeedback(K1=0.3, K2=0.3)
 LEAD = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "tip_deflection": ([0.5], [0.02, 1.0])})
+# from lax to strict limits: value, time constant and margins of the law of each, and whether it meets them
+FRONT = (
+    FrontPoint(0.4, 0.0, 0.09, 9.0, 50.0, 1.1, 1.9, True, {"K1": 4.0, "K2": 0.1}),
+    FrontPoint(1.0, 0.0, 0.16, 12.0, 55.0, 1.2, 1.8, True, {"K1": 3.0, "K2": 0.2}),
+    FrontPoint(1.9, 0.5, 0.4, 13.0, 60.0, 1.3, 1.7, False, {"K1": 2.0, "K2": 0.3}),
+)
 AXES = {
     "comparison": 3,
     "bode": 2,
@@ -76,7 +83,7 @@ def records(tmp_path_factory):
     law, unit = default_gains(rig), rig.input_per_torque
     factors, delays = np.linspace(0.1, 3.0, 8), np.linspace(0.0, 0.03, 9)
     makers = {
-        "comparison": lambda: [tfarm.compare([LAB, LAB.having(hub_inertia=0.2)], modes=2)],
+        "comparison": lambda: [tfarm.compare([LAB, LAB.with_numbers(hub_inertia=0.2)], modes=2)],
         "bode": lambda: [tfarm.bode(LAB, "root_moment", (1.0, 300.0))],
         "gain_map": lambda: [plane()],
         "locus": lambda: [tfarm.locus(LAB, LAW, "K2", -1.0, 1.6, points=60, branches=3)],
@@ -92,7 +99,7 @@ def records(tmp_path_factory):
         "slew": lambda: [LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)],
         **dict.fromkeys(("study", "study_band", "study_scatter"), lambda: [study()]),
         "step": lambda: [tfarm.step(LAB, LAW, scenario_name="slew", duration=2.0)],
-        "trade_off": lambda: [tfarm.trade_off(LAB, number=2)],
+        "trade_off": lambda: [TradeOff("lab", "K1-K2", "settling time", "s", FRONT, (LAW, LAW))],
         "reference": lambda: [tfarm.reference(LAB, LAW, Chain(reference=ReferenceShaping(shaper="ZV")))],
         "locus of a law": lambda: [tfarm.locus(LAB, LEAD, "gain", 0.0, 2.0, 10, 3)],
         "gain_map of a law": lambda: [tfarm.map(LAB, factors, delays, law=LEAD, vary=("gain", "delay"))],

@@ -159,7 +159,7 @@ def test_an_unstable_loop_and_one_without_feedback_have_curves_and_no_margins(na
     """Without feedback S is one and nothing crosses."""
     bare = tfarm.loop_function(LAB, tfarm.HubFeedback())
     assert not bare.sensitivity.any()
-    for found, word in ((tfarm.margins(LAB, LAW.having("K2", 1.5)), "unstable"), (bare, bare.stability)):
+    for found, word in ((tfarm.margins(LAB, LAW.with_number("K2", 1.5)), "unstable"), (bare, bare.stability)):
         figure = getattr(tfarm.plots, name).figure(found)
         assert (labels(*figure.axes), complaints(figure)) == ({}, [])
         assert f"continuous-time: {word}" in " ".join(figure.axes[0].get_legend_handles_labels()[1])

@@ -37,7 +37,7 @@ def test_a_hub_that_loses_something_is_stable_below_no_rate_gain_too(arm):
         windows = plane.stable_intervals[n]
         for K2 in np.array(K2S) * arm.input_per_torque:
             inside = any(low < K2 < high for low, high in windows)
-            loop = plane.loop.having("K1", float(plane.K1[n])).having("K2", float(K2))
+            loop = plane.loop.with_number("K1", float(plane.K1[n])).with_number("K2", float(K2))
             assert inside == bool(abs(loop.eigenvalues).max() < 1)
 
 
@@ -66,4 +66,4 @@ def test_nothing_is_stable_below_the_rate_gain_that_the_words_name(friction):
     for K1 in (-friction - 1e-5, -friction - 0.3, -friction - 20.0):
         for K2 in K2S:
             assert not stability(Case(arm, HubFeedback(K1=K1, K2=K2))).is_stable
-            assert abs(loop.having("K1", K1).having("K2", K2).eigenvalues).max() > 1
+            assert abs(loop.with_number("K1", K1).with_number("K2", K2).eigenvalues).max() > 1

@@ -98,7 +98,7 @@ def test_the_outline_of_a_sampled_region_is_that_of_its_poles():
                         (place.real / 1.5, place.imag), (x, y), (x.grid(4000), y.grid(4000)), strict=True
                     )
                 ]
-                inside = plane.loop.having("K1", K[0]).having("K2", K[1]).poles.is_stable
+                inside = plane.loop.with_number("K1", K[0]).with_number("K2", K[1]).poles.is_stable
                 checked += inside == (side > 0)
                 assert inside == (side > 0) or _near_a_corner(line, n)
     assert checked > 40
@@ -124,6 +124,8 @@ def test_a_locus_under_any_law_keeps_its_poles():
     for n in more[::3]:
         branches = fine.branches[np.isfinite(fine.branches[:, n]), n]
         assert (
-            abs(1 + ContinuousLoop(Case(LAB, LEAD.having("gain", float(fine.gain[n])))).loop_function(branches)).max()
+            abs(
+                1 + ContinuousLoop(Case(LAB, LEAD.with_number("gain", float(fine.gain[n])))).loop_function(branches)
+            ).max()
             < 1e-6
         )

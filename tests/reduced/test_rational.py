@@ -97,4 +97,4 @@ def test_aaa_finds_the_poles_of_a_rational_function():
     ("C", "pairs", "high", "key"), [(1e-4, 6, 1e3, "method"), (0, 3, 1e3, "pairs"), (0, 6, 1e9, "band")]
 )
 def test_what_is_refused(arm, C, pairs, high, key):
-    assert refusal(rational_model, arm.having(damping=C), HUB, pairs, high).key == key
+    assert refusal(rational_model, arm.with_numbers(damping=C), HUB, pairs, high).key == key

@@ -84,7 +84,7 @@ def test_bad_input_is_named(arm, given, key):
 
 
 def test_outputs_without_a_model(arm):
-    assert "hub_rate" in str(refusal(reduce, arm.having(hub_inertia=math.inf), "hub_rate", order=4))
+    assert "hub_rate" in str(refusal(reduce, arm.with_numbers(hub_inertia=math.inf), "hub_rate", order=4))
     assert "once" in str(refusal(reduce, arm, ["root_moment", "root_moment"], order=4))
 
 

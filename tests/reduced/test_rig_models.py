@@ -86,7 +86,7 @@ LEFT_OUT = 2e-3  # of a response: what the modes left out add to their static sh
 
 
 def rubbing(inertia, friction, *, theory="timoshenko", C=1e-4):
-    return replace(LAB.having(damping=C), hub=Hub(inertia=inertia, friction=friction), theory=theory)
+    return replace(LAB.with_numbers(damping=C), hub=Hub(inertia=inertia, friction=friction), theory=theory)
 
 
 @pytest.mark.parametrize("theory", ["timoshenko", "euler-bernoulli"])

@@ -18,7 +18,7 @@ from tfarm.report.response_sections import arm_section, bode_section, modes_sect
 mpl.use("Agg")
 
 LAB = tfarm.load("sasaki2012-lab")
-OWN = LAB.having(hub_inertia=0.12)
+OWN = LAB.with_numbers(hub_inertia=0.12)
 DRAWN = {  # by the kind of picture the section that has it, and what its line of Python draws of the same
     "arm": arm_section,
     "bode-root-moment": lambda case: bode_section(case, "root_moment"),

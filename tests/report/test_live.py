@@ -197,7 +197,7 @@ def test_explore_writes_the_page_that_a_report_has_and_opens_it(tmp_path, monkey
     policy, sources = policy_of(page)
     assert policy["script-src"] == sources["script"]
     with pytest.raises(tfarm.ParameterError, match="hub turns freely"):
-        tfarm.explore(arm.having(hub_inertia=math.inf))
+        tfarm.explore(arm.with_numbers(hub_inertia=math.inf))
     with pytest.raises(tfarm.ParameterError, match="is no Arm"):
         tfarm.explore(arm.name)
 
@@ -205,7 +205,7 @@ def test_explore_writes_the_page_that_a_report_has_and_opens_it(tmp_path, monkey
 def test_an_arm_that_cannot_turn_freely_has_no_samples():
     arm = tfarm.load("sasaki2012")
     with pytest.raises(tfarm.ParameterError, match="turns freely"):
-        loop_panels(arm.having(payload_mass=math.inf), 1000.0)
+        loop_panels(arm.with_numbers(payload_mass=math.inf), 1000.0)
 
 
 # ------------------------------------------------------------ the page of a law

@@ -30,8 +30,8 @@ from tfarm.report.loop_section import (
 from tfarm.report.page import ArmReport, GivenLaw, has_loop
 from tfarm.spectrum.gains import PAPER_GAINS, default_gains
 from tfarm.synthesis import stability_map
+from tfarm.synthesis.design import recommended_gains
 from tfarm.synthesis.goals import Checked
-from tfarm.synthesis.good_region import RequiredGains
 
 LAB, PURE, STOCKY = (tfarm.load(name) for name in ("sasaki2012-lab", "sasaki2012", "stocky-steel"))
 EPS = np.finfo(float).eps
@@ -188,7 +188,7 @@ def test_the_recommended_gains_are_good_at_the_period_of_their_page(section, per
     assert card.sampled.time_constant < tfarm.result_card(LAB, default_gains(LAB), report.chain).sampled.time_constant
     page = recommended_section(report)
     assert page.title == "Recommended gains"
-    assert f"K1 = {gains.K1:.4g}" in page.answer
+    assert f"K1 = {gains.K1:.6g}" in page.answer
     values = dict(zip(values_of(page.blocks[0])["requirement"], values_of(page.blocks[0])["sampled"], strict=True))
     assert values["PM>=45"] == pytest.approx(card.sampled.phase_margin.value, rel=1e-9)
     if period == report.default.chain.sampling.period == 1e-2:
@@ -206,16 +206,33 @@ def test_intervals_are_short_facts_of_the_map(section):
         assert (low, high) == pytest.approx(rows[name].around, rel=5e-4)
 
 
-def test_without_recommended_gains_there_is_a_sentence():
-    section = recommended_section(report_with(LAB, recommended=None))
-    assert section.answer.startswith("None: no gains of the map are stable")
+def test_without_recommended_gains_there_is_the_reason():
+    section = recommended_section(report_with(LAB, recommended=None, why_none="no law K1-K2 is stable"))
+    assert section.answer == "None: no law K1-K2 is stable."
     assert not section.card
 
 
-def test_gains_that_miss_a_requirement_are_not_recommended():
-    """The section names what is not met, and has no card of a controller."""
+@pytest.mark.parametrize(
+    ("conflicts", "alternatives", "next_step"),
+    [
+        ((), (), "`tfarm design sasaki2012-lab --trade-off`"),
+        (("PM>=45",), (), '`tfarm design sasaki2012-lab --require "delay>=1"`'),
+        (("PM>=45",), ("PD",), "`tfarm design sasaki2012-lab --structure PD`"),
+    ],
+)
+def test_gains_that_miss_a_requirement_are_not_recommended(conflicts, alternatives, next_step):
+    """The section names what is not met and the next step, and has no card of a controller."""
     missed = Checked("PM>=45", LAB.name, 26.15, 7.901, 0.824)
-    section = recommended_section(report_with(LAB, recommended=RequiredGains(default_gains(LAB), (missed,))))
-    assert "not met there: PM>=45." in section.answer
+    met = Checked("delay>=1", LAB.name, 3.0, 4.0, -1.0)
+    found = replace(
+        recommended_gains(LAB, Chain())[0],
+        requirements=(missed, met),
+        conflicts=conflicts,
+        alternatives=alternatives,
+    )
+    section = recommended_section(report_with(LAB, recommended=found))
+    assert "with the least violation not met: PM>=45." in section.answer
+    assert ("Without PM>=45" in section.answer) == bool(conflicts)
+    assert next_step in section.answer
     assert not section.card
-    assert values_of(section.blocks[0])["sampled"] == [26.15]
+    assert values_of(section.blocks[0])["sampled"] == [26.15, 3.0]

@@ -224,4 +224,4 @@ def test_frequencies_over_the_hub_inertia_are_those_of_arms_that_have_it():
     for inertia, omega in zip(
         *(column(table, key).values for key in ("hub_inertia_kg_m2", "natural_frequency_rad_s")), strict=True
     ):
-        assert omega == tfarm.modes(arm.having(hub_inertia=inertia), 4).natural_frequency[1:].tolist()
+        assert omega == tfarm.modes(arm.with_numbers(hub_inertia=inertia), 4).natural_frequency[1:].tolist()

@@ -55,7 +55,7 @@ def test_free_and_locked_frequencies_are_those_of_the_commands():
     columns = {each.key: list(each.values) for each in locked_table(ArmReport(arm, Chain()), 6).columns}
     assert columns["index"] == list(range(1, 7))
     assert columns["natural_frequency_rad_s"] == tfarm.modes(arm, 6).natural_frequency[1:].tolist()
-    held = tfarm.modes(arm.having(hub_inertia=math.inf), 6)
+    held = tfarm.modes(arm.with_numbers(hub_inertia=math.inf), 6)
     assert columns["hub_locked_rad_s"] == held.natural_frequency.tolist()
 
 

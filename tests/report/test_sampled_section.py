@@ -72,7 +72,7 @@ def test_the_map_of_both_regions_is_that_of_the_poles():
             law = tfarm.HubFeedback(K1=K1, K2=float(K2))
             assert inside == [
                 stability(Case(LAB, law)).is_stable,
-                loop.having("K1", K1).having("K2", float(K2)).poles.is_stable,
+                loop.with_number("K1", K1).with_number("K2", float(K2)).poles.is_stable,
             ]
 
 

@@ -113,7 +113,7 @@ def test_other_arms_have_the_reason_why_there_is_no_tuner(arm, word):
 
 def test_a_slew_that_runs_away_and_a_guard_that_fails_are_a_sentence():
     """Random arms met both: a traceback out of matplotlib, and 3.21e+06 in the middle of a sentence."""
-    answer = tuner_section(ArmReport(LAB.having(damping=1e-14), Chain())).answer
+    answer = tuner_section(ArmReport(LAB.with_numbers(damping=1e-14), Chain())).answer
     assert answer.startswith("No tuner here: no range of gains is proven stable")
     assert not re.search(r"\de-?\d", with_symbols(answer))
     words = prose("tuner_unproven", error=CertificationError("no sector at K1 = 3.21e+06, C = 6.94e-05 s"))

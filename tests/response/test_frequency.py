@@ -54,7 +54,7 @@ def test_the_counted_phase_is_the_limit_of_small_damping(arm, place):
 )
 def test_along_the_arm_it_begins_and_ends_as_at_root_and_tip(along, x, own):
     """Fields along the arm against the closed forms of its ends."""
-    arm = UNDAMPED.having(damping=1e-4)
+    arm = UNDAMPED.with_numbers(damping=1e-4)
     mine, theirs = bode(arm, along, (2.0, 300.0), x=x * arm.length), bode(arm, own, (2.0, 300.0))
     assert mine.poles == pytest.approx(theirs.poles, rel=1e-12)
     assert mine.zeros == pytest.approx(theirs.zeros, rel=1e-9)
@@ -71,7 +71,7 @@ def test_from_another_input_it_is_the_ratio_of_two_responses():
     data = bode(rig, "tip_acceleration", (1.0, 2000.0), input="hub_angle")
     tip, hub = tfarm.transfer(rig, ["tip_acceleration", "hub_angle"])(1j * data.omega)
     assert data.value == pytest.approx(tip / hub, rel=1e-9)
-    locked = tfarm.modes(rig.having(hub_inertia=math.inf), up_to=2000.0).natural_frequency
+    locked = tfarm.modes(rig.with_numbers(hub_inertia=math.inf), up_to=2000.0).natural_frequency
     assert data.resonances.imag == pytest.approx(locked, rel=1e-3)
     assert (data.gain_unit, data.input_label) == ("m/s^2/rad", "hub angle")
     tables = [each.table for each in sections(data) if each.table]
@@ -102,10 +102,10 @@ def test_a_pole_and_a_zero_that_coincide_cancel():
 
 
 def test_with_a_free_pin_the_gauge_reads_the_torque_and_a_pinned_tip_does_not_move():
-    data = response(UNDAMPED.having(hub_inertia=0.0), "root_moment")
+    data = response(UNDAMPED.with_numbers(hub_inertia=0.0), "root_moment")
     assert data.poles.size == data.zeros.size == 0
     assert abs(data.value + 1).max() < 1e-12
-    assert response(UNDAMPED.having(payload_mass=math.inf), "tip_displacement").is_zero
+    assert response(UNDAMPED.with_numbers(payload_mass=math.inf), "tip_displacement").is_zero
 
 
 def test_behind_an_inductance_an_arm_without_losses_has_the_phase_of_its_values():

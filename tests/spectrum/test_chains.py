@@ -51,7 +51,7 @@ def test_a_prescribed_angle_has_the_modes_of_a_locked_hub():
     """However heavy the hub that is turned: no rigid body, and none of its frequencies left out."""
     arm = lossless(rig())
     arm = replace(arm, motor=None, hub=replace(arm.hub, stiffness=0.0))
-    turned, locked = replace(arm, input="hub_angle"), arm.having(hub_inertia=np.inf)
+    turned, locked = replace(arm, input="hub_angle"), arm.with_numbers(hub_inertia=np.inf)
     assert tfarm.modes(turned, 6).index[0] == 1
     assert np.array_equal(tfarm.modes(turned, 6).natural_frequency, tfarm.modes(locked, 6).natural_frequency)
 

@@ -80,7 +80,7 @@ def test_extreme_ends(damping: tuple[float, float], ends: tuple[float, float, fl
 
 def test_eigenvalues_beyond_the_box_are_zeros_too() -> None:
     """Two branches of this arm once ended at 4e11 1/s, where a slope by differences was none, right of the axis."""
-    arm = tfarm.load("sasaki2012-lab").having(damping=1e-3)
+    arm = tfarm.load("sasaki2012-lab").with_numbers(damping=1e-3)
     found = pairs(listed(arm, 20))
     found = found[np.isfinite(found)]
     assert found.size > 30
@@ -99,7 +99,7 @@ def test_the_papers_determinant_vanishes_there(overdamping: float) -> None:
         ("some", "zero", "infinite"),
     ):
         arm = some_arm(rng, case, damping=0.0, slenderness=(8, 80))
-        arm = arm.having(damping=2 * overdamping / float(tfarm.modes(arm, 5).natural_frequency[-1]))
+        arm = arm.with_numbers(damping=2 * overdamping / float(tfarm.modes(arm, 5).natural_frequency[-1]))
         damped = listed(arm, 5)
         steps = [newton_step(arm, zero) for zero in pairs(damped).ravel()]
         assert max(steps) < 1e-14, (case, steps)
@@ -116,7 +116,7 @@ def test_without_shear_damping_is_proportional(theory, hub, mass, inertia) -> No
     omega = tfarm.modes(rigid, 10, theory=theory).natural_frequency
     flexible = omega[omega > 0]
     for C in (1e-3 / flexible[-1], 1.7 / flexible[4], 11 / flexible[0]):
-        damped = listed(rigid.having(damping=C), 10, theory)
+        damped = listed(rigid.with_numbers(damping=C), 10, theory)
         p, q = pairs(damped).T
         assert (abs((p + q).real + C * flexible**2) < 1e-11 * C * flexible**2 + 64 * EPS * flexible).all()
         np.testing.assert_allclose((p * q).real, flexible**2, rtol=1e-11)
@@ -168,7 +168,7 @@ def test_little_damping_takes_the_bending_share_of_the_energy(seed: int) -> None
     errors = []
     for Cw in (1e-3, 1e-4):
         C = Cw / omega[-1]
-        s = pairs(damped_modes(tfarm.modes(arm.having(damping=C), 8)))[:, 0]
+        s = pairs(damped_modes(tfarm.modes(arm.with_numbers(damping=C), 8)))[:, 0]
         errors.append(abs(s.real / (-C * omega**2 * share) - 1).max())
         assert abs(s.imag / omega - 1).max() < 10 * Cw**2
     assert errors[0] < 1e-3
@@ -201,7 +201,7 @@ def test_a_hub_that_is_held_is_the_limit_of_a_heavy_one(name: str) -> None:
     """They differ by the arm's inertia over the hub's: nothing of a shape is lost where the hub hardly turns."""
     lab = tfarm.load("sasaki2012-lab")
     held, *heavy = (
-        getattr(listed(lab.having(hub_inertia=inertia), 2), name)(np.linspace(0.0, lab.length, 7))
+        getattr(listed(lab.with_numbers(hub_inertia=inertia), 2), name)(np.linspace(0.0, lab.length, 7))
         for inertia in (math.inf, 1e9, 1e12)
     )
     size = abs(held).max()
@@ -227,7 +227,7 @@ def test_on_two_pins_they_are_the_eigenvalues(name, C):
 
     The oracle is the characteristic function, in which k does not occur: a step of Newton's method is rounding.
     """
-    arm = tfarm.load(name).having(damping=C, hub_inertia=0.0, payload_mass=math.inf, payload_inertia=0.0)
+    arm = tfarm.load(name).with_numbers(damping=C, hub_inertia=0.0, payload_mass=math.inf, payload_inertia=0.0)
     omega = tfarm.modes(arm, 6).natural_frequency[1:]
     starts = damped_starts(arm, omega)[2 * omega.size :]  # behind those of no damping
     starts = starts[abs(1 + C * starts) > 0.2]

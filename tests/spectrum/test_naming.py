@@ -123,7 +123,7 @@ def test_a_guess_without_a_slope_is_lost_and_the_others_are_named():
 
 def test_overdamped_modes_beyond_the_list_need_not_be_followed():
     """Without shear s^2 + C w^2 s + w^2 = 0 of each mode: the same zeros."""
-    arm = tfarm.load("sasaki2012").having(damping=1e-3)
+    arm = tfarm.load("sasaki2012").with_numbers(damping=1e-3)
     table = tfarm.modes(arm, 7, theory="euler-bernoulli")
     found = damped_modes(table, reach=2.5)
     w = table.natural_frequency[1:]

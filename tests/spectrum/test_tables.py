@@ -21,7 +21,7 @@ RUBBED = replace(LAB, name="rubbed", hub=replace(LAB.hub, friction=0.4))
 PINNED = replace(STEEL, hub=tfarm.Hub(inertia=0.0), payload=tfarm.Payload(mass=math.inf))
 
 
-@pytest.mark.parametrize("arm", [LAB, STEEL, PINNED, LAB.having(hub_inertia=math.inf)])
+@pytest.mark.parametrize("arm", [LAB, STEEL, PINNED, LAB.with_numbers(hub_inertia=math.inf)])
 def test_every_row_is_of_its_mode(arm):
     """The column of the locked hub too: of a rigid body there is none, of flexible mode n it is number n."""
     found = tfarm.modes(arm, 3)
@@ -98,7 +98,7 @@ def test_a_count_or_frequency_out_of_range_is_refused(given, words):
         tfarm.modes(LAB, **given)
 
 
-@pytest.mark.parametrize(("arm", "count"), thinned([(LAB.having(damping=1e-3), 8), (LAB, 4), (RUBBED, 3)], 2))
+@pytest.mark.parametrize(("arm", "count"), thinned([(LAB.with_numbers(damping=1e-3), 8), (LAB, 4), (RUBBED, 3)], 2))
 def test_each_disc_is_in_the_row_of_its_eigenvalue(arm, count):
     rows = listed_modes(tfarm.modes(arm, count), 15, certify=True).modes
     assert [row.index for row in rows] == list(range(count + 1))

@@ -78,7 +78,7 @@ def test_verdicts_are_those_of_the_loop_itself():
     study = hub_study(arm)
     assert own_row(study).K2_below == pytest.approx(tfarm.margins(arm, PAPER_GAINS).windows["K2"].around[1], rel=1e-12)
     for row in study.candidates[1::2]:
-        candidate = arm.having(hub_inertia=row.hub_inertia)
+        candidate = arm.with_numbers(hub_inertia=row.hub_inertia)
         below, above = (replace(PAPER_GAINS, K2=row.K2_below * factor) for factor in (0.99, 1.01))
         assert row.verdict == "stable"
         assert tfarm.closed_loop_poles(candidate, below, 6).unstable == 0

@@ -230,7 +230,9 @@ def test_a_band_has_the_curves_of_the_arms(found):
     ax = study_band.figure(found).axes[0]
     lines = {line.get_label(): line for line in ax.lines}
     omega, median = lines["median, at each frequency"].get_data()
-    exact = 20 * np.log10([abs(tfarm.transfer(LAB.having(payload_mass=m), "root_moment")(1j * omega)) for m in masses])
+    exact = 20 * np.log10(
+        [abs(tfarm.transfer(LAB.with_numbers(payload_mass=m), "root_moment")(1j * omega)) for m in masses]
+    )
     assert lines["single arms"].get_ydata() == pytest.approx(exact[0], abs=1e-9)
     below, above = np.sort(exact, axis=0)[[DRAWS // 2 - 1, DRAWS // 2]]  # of an even number of arms
     assert np.all((median > below - 1e-9) & (median < above + 1e-9))

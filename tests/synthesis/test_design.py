@@ -124,9 +124,9 @@ def test_the_flat_part_is_that_of_the_valley(name, request):
     limit = best + 0.01 * abs(best)
     for key, (low, high) in found.flat.items():
         inside = np.linspace(low + 1e-6 * (high - low), high - 1e-6 * (high - low), 41)
-        assert all(judge.score(found.law.having(key, float(each))) <= limit for each in inside)
+        assert all(judge.score(found.law.with_number(key, float(each))) <= limit for each in inside)
         for end, bound in zip((low, high), found.bounds[key], strict=True):
-            beyond = found.law.having(key, end + (1e-3 if end == high else -1e-3) * (high - low))
+            beyond = found.law.with_number(key, end + (1e-3 if end == high else -1e-3) * (high - low))
             assert end == bound or judge.score(beyond) > limit
 
 

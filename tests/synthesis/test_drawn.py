@@ -1,7 +1,6 @@
 """One law for drawn arms: no arm of the pool is worse, and the share of fresh ones is that of their study."""
 
 import csv
-from functools import partial
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from tests.shell import answer, refused
 from tests.synthesis.held_loop import HeldLoop
 from tfarm.dsp import Chain
 from tfarm.fitting.posterior import Posterior, PosteriorNumber
-from tfarm.synthesis.drawn import drawn_arms, verify, violation_on
+from tfarm.synthesis.drawn import drawn_arms, verify
 from tfarm.synthesis.required import RequirementTask
 from tfarm.synthesis.requirements import GOOD, Requirement
 from tfarm.synthesis.structures import structure_of
@@ -52,7 +51,7 @@ def found():
     """The law for a pool of 37 arms, on the worst of which the penalty of a search has to outweigh a jump of speed."""
     drawn = drawn_arms(LAB, OVER, pool=37, fresh=12)
     search = task()
-    law, named, case = for_the_worst(arms_of(LAB, (), None), drawn, search.find, partial(violation_on, search), nothing)
+    law, named, case = for_the_worst(arms_of(LAB, (), None), drawn, search.find, search.violation_on, nothing)
     return search, drawn, law, named, case
 
 
@@ -100,7 +99,7 @@ def test_an_unstable_loop_has_no_margin_and_is_the_worst(found):
     assert (shown.met, shown.at_least) == (0, 0.0)
     assert {each.margin for each in shown.margins} == {None}
     for rows in (choice.checked, ()):
-        assert violation_on(search, unstable._replace(checked=rows), LAB) == np.inf
+        assert search.violation_on(unstable._replace(checked=rows), LAB) == np.inf
 
 
 def test_pool_and_fresh_arms_are_rows_of_the_study(tmp_path):

@@ -1,5 +1,6 @@
 """Observer with state feedback, several notches, resonant feedback: against python-control and closed forms."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import control
@@ -7,8 +8,10 @@ import numpy as np
 import pytest
 
 import tfarm
+from tfarm.arm.blocks import Rational
 from tfarm.arm.law import Law
 from tfarm.case import Case
+from tfarm.exported.systems import controller_system
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.reduced.modal import sensed_model
@@ -149,3 +152,27 @@ def test_laws_of_each_structure_are_stable_by_exact_verdicts(name, arm):
     assert isinstance(law, Law)
     assert stability(Case(arm, law)).is_stable
     assert sampled_verdict(Case(arm, law)).is_stable
+
+
+@pytest.mark.parametrize("arm", [LAB, MOTOR], ids=["torque", "voltage"])
+def test_an_observer_with_an_integrator_has_a_state_more_than_its_model(arm):
+    """Simulated and exported: the ratios of both signals have one denominator, that of the angle an integrator too."""
+    form = form_of("LQG", arm)
+    law = form.record_at(form.origin)
+    angle, moment = law.parts
+    n = moment.block.order
+    assert law.order == 2 * n + 1
+    # the same ratio in other numbers: its states are its own
+    apart = Rational(tuple(3 * each for each in moment.block.num), tuple(3 * each for each in moment.block.den))
+    other = Law({}, parts=(angle, replace(moment, block=apart)), references=law.references)
+    systems = [controller_system(Case(arm, each)) for each in (law, other)]
+    assert [len(each.states) for each in systems] == [n + 1, 2 * n + 1]
+    runs = [tfarm.simulate(arm, each, duration=1.0) for each in (law, other)]
+    np.testing.assert_allclose(runs[0].torque, runs[1].torque, atol=1e-7 * abs(runs[1].torque).max())
+    z = np.exp(1j * np.array([0.02, 0.3, 2.0]))
+    for A, B, C, D in (each.matrices for each in systems):
+        values = [C @ np.linalg.solve(at * np.eye(len(A)) - A, B) + D for at in z]
+        tustin = 2 / T * (z - 1) / (z + 1)
+        for found, s in zip(values, tustin, strict=True):
+            expected = [np.polyval(each.block.num, s) / np.polyval(each.block.den, s) for each in law.parts]
+            np.testing.assert_allclose(found[0, :2], np.negative(expected), rtol=1e-6)

@@ -7,7 +7,7 @@ from tests.shared import thinned
 from tests.synthesis.agreement_design import compare, is_null, some_task
 from tfarm import HubFeedback
 from tfarm.case import Case
-from tfarm.dsp.results import simulated_run
+from tfarm.dsp.results import simulate_scenario
 from tfarm.synthesis.slew_measures import SlewMeasures
 from tfarm.synthesis.worst_case import NamedArm
 
@@ -19,7 +19,7 @@ def test_the_settling_time_of_a_slow_loop_is_that_of_a_long_record():
     slew = SlewMeasures(task.arm, task.arm, task.chain, 8)
     first, _ = slew.tasks
     case = Case(task.arm, law, task.chain)
-    run = simulated_run(case, "slew", 60.0, count=8, between=4, outputs=("tip_displacement",))
+    run = simulate_scenario(case, "slew", 60.0, count=8, between=4, outputs=("tip_displacement",))
     between = run.simulation.between
     y = between.signal("tip_displacement")
     last = between.t[abs(y - y[-1]) > 0.02 * abs(y[-1])][-1]

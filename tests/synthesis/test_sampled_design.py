@@ -25,7 +25,7 @@ from tfarm.arm import AT_HUB, TWO_GAINS
 from tfarm.arm.chain import Sampling
 from tfarm.case import Case
 from tfarm.dsp import Chain, ReferenceShaping, Simulator, Slew
-from tfarm.dsp.results import simulated_run
+from tfarm.dsp.results import simulate_scenario
 from tfarm.dsp.scenarios import slew_scenario
 from tfarm.dsp.shaping import impulses_of
 from tfarm.loop.sampled_verdict import sampled_verdict
@@ -39,7 +39,7 @@ from tfarm.synthesis.judge import judge_of as make_judge
 from tfarm.synthesis.structures import structure_of
 from tfarm.tuner.baselines import best_constant
 from tfarm.tuner.trial import slew_trial
-from tfarm.tuner.tuning import controlled_run
+from tfarm.tuner.tuning import simulate_tuner
 
 LAB = tfarm.load("sasaki2012-lab")
 HELD = HeldLoop(LAB, 0.01)
@@ -85,7 +85,7 @@ def test_random_gains_are_no_better(found):
         assert (2 * abs(1 + L) / abs(1 - L)).min() <= found["margin"].value + 0.01
         if tried <= 4:
             assert HELD.damping(law, 2, 150) <= found["damping"].value * (1 + 1e-4)
-            slew = simulated_run(Case(LAB, law, Chain()), "slew", found["residual"].slew_duration).simulation
+            slew = simulate_scenario(Case(LAB, law, Chain()), "slew", found["residual"].slew_duration).simulation
             assert slew.residual_moment >= found["residual"].value * (1 - 1e-4)
     assert tried > 6
 
@@ -147,7 +147,7 @@ def test_a_design_is_at_least_as_good_as_a_known_stable_law(name, structure, obj
     found = tfarm.design(arm, objective, structure=structure)
     assert judge.score(found.law) <= judge.score(law) + AS_GOOD * value
     if objective == "residual":
-        run = simulated_run(Case(arm, law, Chain()), "slew", found.slew_duration).simulation
+        run = simulate_scenario(Case(arm, law, Chain()), "slew", found.slew_duration).simulation
         assert run.residual_moment == pytest.approx(value, rel=1e-5)
 
 
@@ -219,7 +219,7 @@ def test_the_shaper_of_another_arm_is_that_of_the_nominal_one(kind):
 @pytest.mark.parametrize("chain", CHAINS, ids=NAMED)
 def test_a_simulation_finds_the_arms_own_moment_less_the_rigid_arms(chain):
     law = HubFeedback(K1=0.5, K2=0.15, Kp=2.0)
-    found = to_dict(simulated_run(Case(LAB, law, chain), "slew", 1.4, count=6))["residual_moment_rms"]
+    found = to_dict(simulate_scenario(Case(LAB, law, chain), "slew", 1.4, count=6))["residual_moment_rms"]
     assert found == pytest.approx(by_exponentials(LAB, law, chain, 1.4, 6), rel=1e-8)
 
 
@@ -236,7 +236,7 @@ def test_a_design_promises_what_a_simulation_finds(chain, options, monkeypatch):
     """To the last bit; what was minimised, of eight modes, is the same but for the modes left out."""
     monkeypatch.setattr(search, "MOST_RUNS", 1)
     found = design(LAB, "residual", chain=chain, **options)
-    run = simulated_run(Case(LAB, found.law, chain), "slew", found.slew_duration)
+    run = simulate_scenario(Case(LAB, found.law, chain), "slew", found.slew_duration)
     assert found.value == to_dict(run)["residual_moment_rms"]
     assert judge_of(LAB, found.law, "residual", chain).score(found.law) == pytest.approx(found.value, rel=1e-3)
 
@@ -247,13 +247,13 @@ def test_the_tuner_reports_what_a_simulation_finds(chain):
     plan = tuner.Plan(K1=0.5, Kp=2.0, signals=chain.slew.reading, trials=3, duration=1.5)
     tuning = tuner.tune(LAB, plan, chain)
     found = to_dict(tuner.TuningResult(tuning))
-    again = to_dict(controlled_run(LAB, tuning.saved(), chain, "slew", 1.5, count=6, between=0))
+    again = to_dict(simulate_tuner(LAB, tuning.saved(), chain, "slew", 1.5, count=6, between=0))
     for key in ("residual_moment_rms", "residual_raw_moment_rms"):
         assert again[key] == pytest.approx(found[key], rel=1e-9)
     for gain, residual in ((0.0, found["residual_without"]), (0.2, None)):
         record = tuning.trial.with_constant(gain)
         law = HubFeedback(K1=0.5, K2=gain, Kp=2.0)
-        simulated = to_dict(simulated_run(Case(LAB, law, chain), "slew", 1.5, count=6))["residual_moment_rms"]
+        simulated = to_dict(simulate_scenario(Case(LAB, law, chain), "slew", 1.5, count=6))["residual_moment_rms"]
         assert tuner.residual_rms(record, tuning.trial.task) == pytest.approx(simulated, rel=1e-9)
         assert residual is None or residual == pytest.approx(simulated, rel=1e-9)
 
@@ -294,6 +294,6 @@ def test_what_was_not_computed_is_null_and_is_no_number_in_words(capsys):
     assert answer["residual_moment_rms"] is answer["residual_raw_moment_rms"] is None
     short = run(capsys, "simulate", "sasaki2012-lab", "--duration", "0.9")[1]
     assert "residual root moment, as the record ends before the slew" in short
-    later = to_dict(simulated_run(Case(LAB, HubFeedback(K1=0.3, K2=1.2), Chain()), "slew", 60.0, count=6))
+    later = to_dict(simulate_scenario(Case(LAB, HubFeedback(K1=0.3, K2=1.2), Chain()), "slew", 60.0, count=6))
     assert later["stopped_at_s"] > 1.0  # after the slew
     assert later["residual_moment_rms"] is None

@@ -242,7 +242,7 @@ def test_a_search_near_a_known_point_keeps_it_and_is_shorter():
 @pytest.mark.parametrize("objective", ["damping", "residual"])
 def test_a_score_up_to_its_limit_is_whole_and_one_above_stays_above(objective):
     form, rng = form_of("strain-rate"), np.random.default_rng(4)
-    arms = (LAB, LAB.having(payload_mass=0.3))
+    arms = (LAB, LAB.with_numbers(payload_mass=0.3))
     worst = search.Worst(tuple(judge.judge_of(arm, LAB, Chain(), objective, form.signals, 2, 8) for arm in arms))
     low, high = form.box
     x = np.c_[
@@ -391,7 +391,7 @@ def test_pi_needs_friction(monkeypatch):
 
 def test_a_pinned_tip_has_laws_of_all_structures_and_a_locked_hub_none():
     """Sizes are those of the finite parts: the inertia of an arm with a pinned tip is infinite."""
-    pinned, locked = LAB.having(payload_mass=np.inf), LAB.having(hub_inertia=np.inf)
+    pinned, locked = LAB.with_numbers(payload_mass=np.inf), LAB.with_numbers(hub_inertia=np.inf)
     for name in STRUCTURES.keys() - {TWO_GAINS}:
         form = structure_of(name, pinned, Kp=0.0, modes=2, period=T, bounds={})
         assert np.isfinite([form.origin, *form.box]).all()

@@ -45,7 +45,7 @@ def test_a_further_search_is_given_what_the_one_before_found():
 
 
 def test_every_arm_is_held_and_damped_as_by_another_model(found):
-    ends = [LAB.having(payload_mass=mass) for mass in MASSES]
+    ends = [LAB.with_numbers(payload_mass=mass) for mass in MASSES]
     for each, arm in zip(found.arms, (LAB, SHORT, *ends), strict=False):
         held = HeldLoop(arm, T)
         assert held.damping(found.law, 2, 150) == pytest.approx(each.value, rel=1e-4)
@@ -56,7 +56,7 @@ def test_every_arm_is_held_and_damped_as_by_another_model(found):
     assert found.value == min(each.value for each in found.arms)
     # no arm inside the box is worse
     for mass in np.linspace(*MASSES, 9)[1:-1]:
-        inside = HeldLoop(LAB.having(payload_mass=mass), T).damping(found.law, 2, 150)
+        inside = HeldLoop(LAB.with_numbers(payload_mass=mass), T).damping(found.law, 2, 150)
         assert inside >= found.value * (1 - 0.02)
 
 
@@ -64,7 +64,7 @@ def test_every_arm_is_held_and_damped_as_by_another_model(found):
 def test_no_other_gains_serve_all_arms_better(found):
     """Nor those that are best for one of them."""
     alone = design(LAB, "damping", K1=(0.1, 30.0), K2=(-0.6, 0.95)).law
-    models = [HeldLoop(arm, T) for arm in (LAB, SHORT, *(LAB.having(payload_mass=mass) for mass in MASSES))]
+    models = [HeldLoop(arm, T) for arm in (LAB, SHORT, *(LAB.with_numbers(payload_mass=mass) for mass in MASSES))]
     rng = np.random.default_rng(4)
     K1, K2 = found.law.K1 * rng.uniform(0.8, 1.2, 30), found.law.K2 + rng.uniform(-0.1, 0.1, 30)
     for law in [alone, *(HubFeedback(K1=a, K2=b) for a, b in zip(K1, K2, strict=True))]:
@@ -100,7 +100,9 @@ def test_a_law_for_structures_serves_both_ends_too():
 
 
 def test_a_number_is_named_as_in_the_file_or_as_of_a_locus():
-    assert vary_arm(LAB, "payload.mass", 0.2) == vary_arm(LAB, "payload_mass", 0.2) == LAB.having(payload_mass=0.2)
+    assert (
+        vary_arm(LAB, "payload.mass", 0.2) == vary_arm(LAB, "payload_mass", 0.2) == LAB.with_numbers(payload_mass=0.2)
+    )
     assert vary_arm(LAB, "hub.friction", 0.3).hub == Hub(inertia=LAB.hub.inertia, friction=0.3)
     assert ArmBox(LAB, {"link.damping": (1e-5, 1e-3)}).at(np.array([0.5])).arm.damping == pytest.approx(1e-4)
     assert ArmBox(LAB, {"payload.mass": (0.1, 0.5)}).at(np.array([0.5])).arm.payload.mass == pytest.approx(0.3)

@@ -133,7 +133,7 @@ def test_the_papers_arm_keeps_the_papers():
 @pytest.mark.parametrize(("hub", "wanted"), [(0.1, [1e-5, 1e-3]), (1e-3, [5e-6, 5e-4])])
 def test_an_arm_without_damping_is_tried_with_two_dampings_of_its_first_mode(hub, wanted):
     """0.0358 and 3.58 per cent of critical, but that C is rounded to one digit."""
-    arm = tfarm.load("sasaki2012").having(hub_inertia=hub)
+    arm = tfarm.load("sasaki2012").with_numbers(hub_inertia=hub)
     given = [each.case.arm for each in tried_loops(Case(arm, GAINS)) if each.name.startswith("C =")]
     assert [each.damping for each in given] == wanted
     ratios = [tfarm.damped_modes(tfarm.modes(each, 1)).damping_ratio[-1] for each in given]

@@ -13,7 +13,7 @@ import tfarm
 from tests.shell import answer, refused, run
 from tfarm.case import Case
 from tfarm.dsp import Chain
-from tfarm.dsp.results import simulated_run
+from tfarm.dsp.results import simulate_scenario
 from tfarm.schema import to_dict
 from tfarm.tuner import Plan, compare_controllers, shaped_trial, slew_trial, tune
 from tfarm.tuner.baselines import tried_loops
@@ -168,7 +168,7 @@ ARM, UNIT = tfarm.load(SMALL), 0.3  # N m: a tenth of the paper's 3 N m is what 
 
 def cost_by_hand(law, duration=3.0):
     """T sum of (x^2 + 2.6 e^2)/2 of a simulated slew, in units of 0.3 N m; e is what the law adds to r."""
-    found = to_dict(simulated_run(Case(ARM, law, Chain()), "slew", duration, count=6))
+    found = to_dict(simulate_scenario(Case(ARM, law, Chain()), "slew", duration, count=6))
     t, acceleration = np.array(found["t"]), 4 * 1.15  # rad/s^2: 1.15 rad in 1 s
     sign = np.where(t < 0.5 - 1e-9, 1.0, np.where(t < 1.0 - 1e-9, -1.0, 0.0))
     before = np.r_[0.0, sign[:-1]]

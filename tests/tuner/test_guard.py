@@ -48,7 +48,7 @@ def test_gains_of_a_tuner_are_those_that_hold_from_0_to_10(monkeypatch, lab):
 def criterion(loop, lo, hi):
     """1 + (lo + hi) Re H + lo hi |H|^2 at z = e^{i theta}, by transfer functions."""
     z, sampled = np.exp(1j * FINE), loop.loop
-    H = sampled.rig.terms(z, None, np.ones(z.size))[1 + sampled.part("K2")] / sampled.having("K2", 0.0)(z)
+    H = sampled.rig.terms(z, None, np.ones(z.size))[1 + sampled.part("K2")] / sampled.with_number("K2", 0.0)(z)
     return 1 + (lo + hi) * H.real + lo * hi * abs(H) ** 2
 
 
@@ -184,8 +184,8 @@ def test_the_frozen_guard_is_stable_inside_and_not_beyond(lab):
     assert not guard.is_proven
     assert "not certified for one that varies" in guard.sentence
     for K in np.linspace(guard.lo, guard.hi, 25):
-        assert loop.having("K1", 0.3).having("K2", float(K)).poles.is_stable
-    assert not loop.having("K1", 0.3).having("K2", guard.hi * 1.02).poles.is_stable
+        assert loop.with_number("K1", 0.3).with_number("K2", float(K)).poles.is_stable
+    assert not loop.with_number("K1", 0.3).with_number("K2", guard.hi * 1.02).poles.is_stable
 
 
 def test_without_damping_a_proof_is_of_the_first_modes_and_no_proof_of_the_loop():

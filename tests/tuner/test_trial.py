@@ -121,7 +121,7 @@ def test_a_slew_on_another_arm_keeps_its_length_and_its_design(lab):
     """Sample by sample, at periods that no double holds too."""
     for period in (0.01, 0.007):
         trial = slew_trial(lab, Chain(sampling=Sampling(period=period)), K1=0.3)
-        other = trial.on(Case(lab.having(payload_mass=0.1), HubFeedback(K1=0.2, K2=1.0), trial.loop.chain))
+        other = trial.on(Case(lab.with_numbers(payload_mass=0.1), HubFeedback(K1=0.2, K2=1.0), trial.loop.chain))
         assert other.n == trial.n
         np.testing.assert_array_equal(other.task.hub_angle, trial.task.hub_angle)
         assert other.loop.gains.K1 == 0.2

@@ -229,7 +229,10 @@ def block_of(key: str, entry: Any) -> tuple[LawBlock, float | None]:
         require(is_known, key, sorted(map(str, entry)), remedy)
         return Rational.of_roots(entry.get("zeros", ()), entry.get("poles", ()), entry["gain"]), None
     if isinstance(entry, tuple | list) and len(entry) == 2:
-        return Rational(*map(_row, entry)), None
+        try:
+            return Rational(*map(_row, entry)), None
+        except ParameterError as error:
+            raise ParameterError(key=f"{key}.{error.key}", value=error.value, remedy=error.remedy) from None
     remedy = "a finite number, (num, den), a mapping with zeros, poles and gain, or a python-control system"
     return Rational((number(key, entry, remedy),)), None
 

@@ -30,6 +30,7 @@ from tfarm.schema import Quantity
 MomentReading = Literal["vibration", "total"]
 Profile = Literal["bang-bang", "s-curve", "polynomial", "file"]
 ShaperName = Literal["none", "ZV", "ZVD", "EI"]
+FeedforwardName = Literal["rigid", "inverse", "none"]
 # samples: each whole one is a state more
 MOST_DELAY = 100.0
 # of a time: by so little before a sample it is at it, as its quotient with the period is rounded
@@ -202,12 +203,14 @@ class ReferenceShaping:
     """The reference of a slew: the `profile` of its motion, and the `shaper` for the first `modes` of the loop.
 
     A profile "file" is read from the CSV `file`, time [s] and angle or travel in any unit: it is scaled to `Slew`.
+    `feedforward` is the torque of the rigid arm or of the exact one at its hub.
     """
 
     profile: Profile = "bang-bang"
     shaper: ShaperName = "none"
     modes: int = 2
     file: str | None = None
+    feedforward: FeedforwardName = "rigid"
 
     def __post_init__(self) -> None:
         must_be_known("reference.profile", self.profile, get_args(Profile))
@@ -215,6 +218,10 @@ class ReferenceShaping:
         # each mode more is half a period of it more
         whole("reference.modes", self.modes, 1, 10, "a whole number of flexible modes to shape for, 1 to 10")
         remedy = 'the path of a CSV file of time and angle, with profile = "file"; leave it out otherwise'
+        must_be_known("reference.feedforward", self.feedforward, get_args(FeedforwardName))
+        is_smooth = self.feedforward != "inverse" or self.profile in ("s-curve", "polynomial")
+        smooth = 'the inverse at the hub is of a profile of limited jerk: "s-curve" or "polynomial"'
+        require(is_smooth, "reference.feedforward", self.feedforward, smooth)
         is_named = isinstance(self.file, str) and bool(self.file.strip())
         is_right = is_named if self.profile == "file" else self.file is None
         require(is_right, "reference.file", self.file, remedy)
@@ -287,7 +294,7 @@ def load_chain(name_or_path: AnyFile) -> Chain:
 
 def chain_of_tables(tables: Mapping[str, Any]) -> Chain:
     """Return the chain of a parsed file, which may also have the tables of an arm."""
-    known = {*CHAIN_TABLES, *ArmTable.model_fields, "law", "requirements"}
+    known = {*CHAIN_TABLES, *ArmTable.model_fields, "law", "weights", "requirements"}
     for key, value in tables.items():
         require(key in known, key, value, unknown_key(key, CHAIN_TABLES))
     records = {}

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from tfarm.arm.checks import INPUT_UNITS, LARGEST_NUMBER, number
 from tfarm.arm.records import Arm
 from tfarm.errors import must_be_known, require
+from tfarm.moved import FormerName
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,10 +98,12 @@ class HubFeedback:
         """Return `K1 = 0.3`: the gain of that name, its value written by `how`, with its unit on an arm."""
         return f"{name} = {how(self[name])}{'' if arm is None else written_unit(name, arm)}"
 
-    def having(self, name: str, value: float) -> HubFeedback:
+    def with_number(self, name: str, value: float) -> HubFeedback:
         """Return the law with another value of one gain.  Raises ParameterError for an unknown one."""
         must_be_known("law", name, NAMES)
         return replace(self, **{name: value})
+
+    having = FormerName("with_number")
 
     def times(self, factor: float) -> HubFeedback:
         """Return the law with every gain times a number."""

@@ -24,6 +24,7 @@ from tfarm.arm.feedback import AT_HUB, GAINS, ON, OUTPUT_OF, HubFeedback
 from tfarm.arm.records import Arm
 from tfarm.arrays import Complex
 from tfarm.errors import ParameterError, did_you_mean, must_be_known, require
+from tfarm.moved import FormerName
 from tfarm.records import frozen
 
 # before the name of a signal: its reference
@@ -176,7 +177,7 @@ class Law:
 
     @property
     def numbers(self) -> dict[str, float]:
-        """Each number other than 0 in which the loop is linear, by its name in `having`.
+        """Each number other than 0 in which the loop is linear, by its name in `with_number`.
 
         That is "gain", a factor on the law, and for each signal with a block of its own the constant gain, or the
         coefficients of its polynomials and, for more than one, a factor, "hub_angle.gain".  A signal in several parts
@@ -198,7 +199,7 @@ class Law:
 
     @property
     def part_gains(self) -> dict[str, tuple[int, float]]:
-        """Each part of a single signal: its index among `parts`, and its gain, by its name in `having`.
+        """Each part of a single signal: its index among `parts`, and its gain, by its name in `with_number`.
 
         A constant gain has the name of its signal, "hub_angle"; other blocks have a factor of 1, "hub_angle.gain".
         """
@@ -282,15 +283,17 @@ class Law:
 
     def times(self, factor: float) -> Law:
         """Return the law times a number."""
-        return self.weighted([factor] * len(self.parts))
+        return self.with_factors([factor] * len(self.parts))
 
-    def weighted(self, factors: Sequence[float]) -> Law:
+    def with_factors(self, factors: Sequence[float]) -> Law:
         """Return the law with each part times its own factor."""
         pairs = zip(self.parts, factors, strict=True)
         parts = (replace(part, block=part.block.times(factor)) for part, factor in pairs)
         return replace(self, parts=tuple(parts))
 
-    def having(self, key: str, value: float) -> Law:
+    weighted = FormerName("with_factors")
+
+    def with_number(self, key: str, value: float) -> Law:
         """Return the law with another value of one number.
 
         Its key is "delay"; "gain", a factor on the law; "hub_angle" or "hub_angle.gain", a factor on one signal;
@@ -311,6 +314,8 @@ class Law:
                 return replace(self, parts=tuple(parts))
         known = ["gain", "delay", *(part.signals[0] for part in self.parts if len(part.signals) == 1)]
         raise ParameterError(key="law", value=key, remedy=did_you_mean(key, known))
+
+    having = FormerName("with_number")
 
 
 def _parts_of(entries: Mapping[str, Any]) -> tuple[tuple[Part, ...], tuple[float, ...]]:
@@ -364,11 +369,16 @@ def as_law(law: AnyLaw) -> Law:
 
 
 def of_common_blocks(law: Law) -> Law:
-    """Return the law with ratios of the same denominator as one block: apart, each adds poles that no signal shows."""
+    """Return the law with ratios of the same denominator as one block: apart, each adds poles that no signal shows.
+
+    Poles at 0 may be those of one of the ratios: the integrator of one signal.
+    """
     alike: dict[object, list[Part]] = {}
     for part in law.parts:
-        is_shared = part.block.order and part.block.excess <= 0
-        key = getattr(part.block, "den", id(part)) if is_shared else id(part)
+        block = part.block
+        key: object = id(part)
+        if isinstance(block, Rational) and block.order and block.excess <= 0:
+            key = tuple(np.trim_zeros(block.den, "b"))
         alike.setdefault(key, []).append(part)
     return replace(law, parts=tuple(map(_merge, alike.values())))
 
@@ -377,7 +387,13 @@ def _merge(parts: Sequence[Part]) -> Part:
     """Return ratios of the same denominator as one block, in observable form: the transpose of each one's states."""
     if len(parts) == 1:
         return parts[0]
-    A, B, C, D = zip(*(part.block.matrices() for part in parts), strict=True)
+    order = max(part.block.order for part in parts)
+    blocks = []
+    for part in parts:
+        assert isinstance(part.block, Rational)
+        poles_at_origin = (0.0,) * (order - part.block.order)
+        blocks.append(Rational(part.block.num + poles_at_origin, part.block.den + poles_at_origin))
+    A, B, C, D = zip(*(block.matrices() for block in blocks), strict=True)
     signals = tuple(chain.from_iterable(part.signals for part in parts))
     return Part(signals, StateSpace(A[0].T, np.vstack(C).T, B[0].T, np.hstack(D)))
 

@@ -75,9 +75,9 @@ class WeightTable(StrictTable):
     """[weights]: a number or a table as of [law.SIGNAL] for each of S, KS and T."""
 
     period: float | None = None
-    S: float | dict[str, Any] | None = None
-    KS: float | dict[str, Any] | None = None
-    T: float | dict[str, Any] | None = None
+    S: Any = None
+    KS: Any = None
+    T: Any = None
 
 
 def load_weights(name_or_path: AnyFile) -> Weights | None:

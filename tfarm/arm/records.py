@@ -20,6 +20,7 @@ from tfarm.arm.checks import (
 )
 from tfarm.arm.parts import Attachment, Gauge, Hub, Link, Motor, Payload, RotarySpring, brief_repr
 from tfarm.errors import ParameterError, must_be_known, require, short_text
+from tfarm.moved import FormerName
 
 # segments, and attachments: a check of the chain has 64 equal pieces
 MOST_PARTS = 64
@@ -335,7 +336,7 @@ class Arm:
 
     # ------------------------------------------------------------ other arms
 
-    def having(self, **numbers: float) -> Arm:
+    def with_numbers(self, **numbers: float) -> Arm:
         """Return the arm with other values of numbers in `ADJUSTABLE`, in SI units.
 
         The damping is that of every segment.  A hub locked by an infinite inertia loses its friction, spring and motor.
@@ -356,6 +357,8 @@ class Arm:
             arm = replace(arm, **{part: replace(getattr(arm, part), **{number: value})})
         return arm
 
+    having = FormerName("with_numbers")
+
     def under(self, theory: Theory) -> Arm:
         """Return the arm under another of `THEORIES`.  Raises ParameterError for an unknown one."""
         return replace(self, theory=theory)
@@ -363,7 +366,7 @@ class Arm:
     @property
     def elastic(self) -> Arm:
         """The arm with C = 0 in every segment."""
-        return self if self.has_elastic_link else self.having(damping=0.0)
+        return self if self.has_elastic_link else self.with_numbers(damping=0.0)
 
     @property
     def lossless(self) -> Arm:

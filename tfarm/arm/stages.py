@@ -29,13 +29,8 @@ class Stage(NamedTuple):
     remainder: str = ""
 
 
-def _read_stages() -> tuple[Stage, ...]:
-    """Return the stages in the file `stages.toml`."""
-    tables = tomllib.loads((files("tfarm.arm") / "stages.toml").read_text("utf-8"))
-    return tuple(Stage(**{**each, "keys": tuple(each["keys"])}) for each in tables["stage"])
-
-
-STAGES = _read_stages()
+_TABLES = tomllib.loads((files("tfarm.arm") / "stages.toml").read_text("utf-8"))
+STAGES = tuple(Stage(**{**each, "keys": tuple(each["keys"])}) for each in _TABLES["stage"])
 STAGE_OF = {key: stage for stage in STAGES for key in stage.keys}
 # those of the arm itself
 ARM_KEYS = STAGE_OF["link.length"].keys

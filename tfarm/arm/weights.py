@@ -12,6 +12,8 @@ from tfarm.records import frozen
 
 # S = 1/(1 + L), K S and T = L/(1 + L), K the controller
 WEIGHTED = ("S", "KS", "T")
+# where none is given: the norms are Ms and Mt
+USUAL_WEIGHTS = {"S": 1.0, "T": 1.0}
 
 
 @frozen

@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 
 from tfarm.arm import Arm, Theory, implausible
 from tfarm.arm.chain import PERIOD, chain_of_tables, load_chain
-from tfarm.arm.law_tables import load_law
+from tfarm.arm.law_tables import load_law, load_weights
 from tfarm.arm.reading import load, load_tables
 from tfarm.arm.schema import arm_of_table
 from tfarm.assessment.card import reference_damping
@@ -118,12 +118,18 @@ def check_arm(name: str, theory: Theory | None = None) -> ArmCheck:
     if theory is not None:
         arm = arm.under(theory)
     law = load_law(file)
+    load_weights(file)
     chain = load_chain(file)
     first = listed_modes(modes(arm, 1)).modes[-1]
     omega = float(first.natural_frequency)
     of_bernoulli = first.theories["euler-bernoulli"]
     error = Percent(of_bernoulli / omega - 1)
     ratio = 0.0 if arm.is_undamped else first.damping_ratio
+    command = f"design {shlex.quote(name)} --save law.toml"
+    if law is not None:
+        command = f"margins {shlex.quote(name)}"
+    if arm.is_locked:
+        command = f"modes {shlex.quote(name)}"
     slenderness = min(arm.length / link.section.radius_of_gyration for link in arm.links)
     return ArmCheck(
         arm=arm.name,
@@ -140,7 +146,7 @@ def check_arm(name: str, theory: Theory | None = None) -> ArmCheck:
         period=chain.sampling.period,
         torque_limit=chain.actuator.torque_limit,
         input_unit=arm.input_unit,
-        next_command=f"tfarm {'modes' if arm.is_locked else 'margins'} {shlex.quote(name)}",
+        next_command=f"tfarm {command}",
         warnings=[
             Note(*text.split(": ", 1))
             for text in _warnings(file.tables, arm, slenderness, error, chain, omega)
@@ -189,5 +195,5 @@ def with_damping(tables: dict[str, Any], ratio: float | None) -> dict[str, Any]:
     )
     # of bending alone
     C = reference_damping(arm, ratio)
-    found = listed_modes(modes(arm.having(damping=C), 1)).modes[-1].damping_ratio or ratio
+    found = listed_modes(modes(arm.with_numbers(damping=C), 1)).modes[-1].damping_ratio or ratio
     return tables | {"link": {"damping": float(f"{C * ratio / found:.4g}")} | tables["link"]}

@@ -302,7 +302,7 @@ def graded_arm(arm: Arm) -> tuple[Arm, str]:
         f"undamped model: margins and grades are those with C = {reference:.4g} s, 0.1 % of critical damping "
         "in mode 1; at C = 0 the exact delay and disk margins are 0 for every gain"
     )
-    return arm.having(damping=reference), note
+    return arm.with_numbers(damping=reference), note
 
 
 def card_of(found: Margins | Analysis, chain: Chain, graded: Margins | Analysis | None = None) -> LoopCard:

@@ -210,8 +210,9 @@ def step(
             sensed_plant(arm, Chain(), ("tip_displacement",), 1).unfiltered, task.tip_offset, scenario_name
         )
     response = None
-    has_steps = task.name != "slew" or chain.reference.profile in STEPS_OF_PROFILE
-    if poles is not None and has_steps:
+    reference_of = chain.reference
+    has_steps = reference_of.profile in STEPS_OF_PROFILE and reference_of.feedforward == "rigid"
+    if poles is not None and (task.name != "slew" or has_steps):
         response = time_response(poles, names, excitation(poles.loop, case, task, names), length)
     t = _times(response, task)
     reference = _references(task, t, hub, tip, arm.reach)
@@ -298,9 +299,9 @@ def usual_duration(poles: Poles | None, chain: Chain) -> float:
     rise = chain.slew.rise_time
     if poles is None:
         return TRIAL_SLEWS * rise
-    sizes = abs(poles.moving)
+    sizes = abs(poles.nonzero)
     # a pole farther away than twice the first frequency is not the dominant one
-    near = poles.moving[sizes <= 2.0 * max(first_frequency(poles.loop.arm), sizes.min(initial=math.inf))]
+    near = poles.nonzero[sizes <= 2.0 * max(first_frequency(poles.loop.arm), sizes.min(initial=math.inf))]
     # at most 20 slews
     decay = max(abs(near.real).min(initial=math.inf), time_constants / (20.0 * rise))
     return float(f"{rise + time_constants / decay:.2g}")

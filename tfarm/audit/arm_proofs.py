@@ -176,7 +176,7 @@ def enclose_poles(arm: Arm) -> Iterator[Boxed]:
         law = default_gains(arm)
         gains = ", ".join(law.gain_text(name, lambda gain: plain(gain, 6)) for name in PLANE)
         poles = partial(closed_loop_poles, arm, law, PROVEN_MODES)
-        boxes[f"closed loop, {gains}"] = lambda: poles().certified(PROVEN_DIGITS)
+        boxes[f"closed loop, {gains}"] = lambda: poles().with_discs(PROVEN_DIGITS)
     for what, proven in boxes.items():
         try:
             found = proven()

@@ -18,6 +18,7 @@ from tfarm.cli.options import (
     File,
     LawFile,
     TheoryName,
+    WeightEntries,
     chain_of_options,
     interval,
     law_of_options,
@@ -25,7 +26,6 @@ from tfarm.cli.options import (
     load_driven_loop,
     load_loop,
     name_and,
-    numbers,
     refuse,
     without_none,
 )
@@ -58,7 +58,7 @@ def poles(
     """
     case, defaults = loop(arm)
     found = case.poles(count)
-    show(found.certified() if certify else found, defaults)
+    show(found.with_discs() if certify else found, defaults)
 
 
 @command(epilog="margins sasaki2012-lab --K1 0.3 --K2 0.3")
@@ -188,7 +188,7 @@ def map_plane(
         controller, _ = law_of_options(file, arm, {}, law)
     else:
         ranges = {name: typed[name] or usual for name, usual in zip(PLANE, ranges_of(arm), strict=True)}
-        controller = tfarm.default_gains(arm).having(ANGLE_GAIN, kp)
+        controller = tfarm.default_gains(arm).with_number(ANGLE_GAIN, kp)
     number = points or (60 if vary or law else 101)
     return controller, {name: cell_middles(low, high, number) for name, (low, high) in ranges.items()}
 
@@ -242,20 +242,11 @@ def sampled(
     show(found, defaults, summary=case.card(at_samples=found))
 
 
-def weight_entry(text: str) -> tuple[Any, ...]:
-    """Return numerator and denominator of NUM/DEN, coefficients in descending powers of s; of NUM over 1."""
-    num, _, den = text.partition("/")
-    coefficients = numbers("coefficients NUM or NUM/DEN in descending powers of s, such as 0.5,2/1,0.02")
-    return coefficients(num), coefficients(den or "1")
-
-
 @command(epilog="norm sasaki2012-lab --K1 3 --K2 0.15 --weight S=0.5,2/1,0.02 --weight KS=0.1")
 def norm(
     *,
     arm: ArmName,
-    weight: Annotated[
-        list[Any] | None, typer.Option(parser=name_and(weight_entry), metavar="NAME=NUM/DEN")
-    ] = None,
+    weight: WeightEntries = None,
     loop: Any = load_loop,
     chain: Any = chain_of_options,
     show: Any = emit_record,
@@ -264,9 +255,6 @@ def norm(
 
     They are those of the sampled loop, and the bounds hold between frequencies too.  The weights are those of
     [weights] in the controller's file, else in the arm's; without any S and T have the weight 1.
-
-    Options:
-    weight: weight on S, KS or T, coefficients in descending powers of s; may be repeated, and replaces those of a file
     """
     from tfarm.arm.law_tables import load_weights
 
@@ -311,7 +299,11 @@ def reference(
     shaper: str | None = None,
     profile: str | None = None,
     modes: Annotated[int | None, typer.Option("--modes", min=1, max=10)] = None,
+    feedforward: str | None = None,
     error: float = 0.3,
+    over: Annotated[
+        list[Any] | None, typer.Option("--range", parser=name_and(interval), metavar="KEY=LO,HI")
+    ] = None,
     loop: Any = load_loop,
     chain: Any = chain_of_options,
     show: Any = emit,
@@ -324,15 +316,19 @@ def reference(
     shaper: none, ZV, ZVD or EI; by default that of [reference] in the file
     profile: bang-bang, s-curve or polynomial; by default that of [reference]
     modes: the first flexible modes, which are shaped for; by default those of [reference], or two
+    feedforward: rigid, inverse (of the exact arm at its hub) or none; by default that of [reference]
     error: largest error of the frequencies, as a share
+    over: range of a number such as payload.mass or hub.inertia, over which the residual is bounded; may be repeated
     """
     case, defaults = loop(arm)
     own = chain(arm)
-    typed: Any = without_none({"shaper": shaper, "profile": profile, "modes": modes})
+    typed: Any = without_none(
+        {"shaper": shaper, "profile": profile, "modes": modes, "feedforward": feedforward}
+    )
     if profile is not None:
         typed["file"] = None
     case = case.through(replace(own, reference=replace(own.reference, **typed)))
-    show(case.reference(error=error), defaults)
+    show(case.reference(error=error, ranges=dict(over or [])), defaults)
 
 
 @command(epilog="simulate sasaki2012-lab --scenario slew --output tip_rotation --csv slew.csv")
@@ -364,7 +360,7 @@ def simulate(
     animate: draw the arm in motion into this file, a GIF
     controller: tuner of `tfarm tune --save`: it sets K2, with its own K1
     """
-    from tfarm.dsp.results import simulated_run
+    from tfarm.dsp.results import simulate_scenario
 
     if animate is not None:
         require(animate.suffix.lower() == ".gif", "--animate", str(animate), "give a name that ends in .gif")
@@ -373,13 +369,13 @@ def simulate(
     defaults = None
     if controller is None:
         case, defaults = loop(arm)
-        found = simulated_run(case.through(chain(arm)), scenario, duration, **how)
+        found = simulate_scenario(case.through(chain(arm)), scenario, duration, **how)
     else:
         from tfarm.tuner import load_tuner, tuning
 
         subject = load_arm(arm, loop.keywords["theory"])
         tuner = load_tuner(controller)
-        found = tuning.controlled_run(subject, tuner, chain(arm), scenario, duration, **how)
+        found = tuning.simulate_tuner(subject, tuner, chain(arm), scenario, duration, **how)
     if mat is not None:
         write_file(mat, mat_content(matlab_signals(found), "column"), key="--mat")
     if animate is not None:

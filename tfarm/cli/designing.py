@@ -22,6 +22,7 @@ from tfarm.cli.options import (
     ModeCount,
     Png,
     TheoryName,
+    WeightEntries,
     chain_of_options,
     gains_of_options,
     interval,
@@ -36,7 +37,6 @@ from tfarm.cli.options import (
 )
 from tfarm.cli.output import emit, emit_record
 from tfarm.cli.progress import advance, print_line
-from tfarm.errors import require
 from tfarm.files import is_standard_output
 
 command = partial(add_command, "Design")
@@ -69,7 +69,8 @@ def design(
     ] = None,
     study: Annotated[Path | None, typer.Option("--study", metavar="FILE", exists=True)] = None,
     posterior: Annotated[Path | None, typer.Option("--posterior", metavar="FILE", exists=True)] = None,
-    fresh: int = 64,
+    fresh: int | None = None,
+    weight: WeightEntries = None,
     trade_off: Annotated[bool, typer.Option("--trade-off")] = False,
     save: File = None,
     theory: TheoryName = None,
@@ -82,25 +83,28 @@ def design(
     The sampling period is that of the file, or else 10 ms.
 
     Options:
-    objective: settling, time-constant, torque, Ms ...; without requirements: damping, margin, sensitivity, delay,
-        residual or cost (of the tuner)
+    objective: quantity that is minimised under requirements: settling, time-constant, overshoot, residual, torque, Ms,
+        norm, bandwidth^-1 ...; or one without requirements: damping, margin, sensitivity, delay, residual or cost (of
+        the tuner)
     require: requirements such as "GM>=6, PM>=45, Ms<=2, delay>=1, damping>=2%, torque<=5, settling<=1.5"
     study: file of a study: requirements hold on the worst arms of a pool drawn from it
     posterior: posterior of a fit, likewise
-    fresh: further arms drawn, on which the law is examined
+    fresh: further arms drawn, on which the law is examined; by default 64
     trade_off: the front of speed against robustness instead: 12 designs; --save FILE writes each to FILE-01.toml ...
     continuous: for the continuous-time loop
     also: further arm; the objective is the worst of all; may be repeated
     over: range of a number of the arm, such as payload.mass=0.1,0.5; up to four: corners, and a search inside
     save: write the law to this TOML file, for --law
     """
+    from tfarm.arm.law_tables import load_weights
     from tfarm.arm.writing import save_law
     from tfarm.synthesis.requirements import load_requirements
 
+    if study is None and posterior is None:
+        refuse({"fresh": fresh}, "goes with --study or --posterior")
     subject = load_arm(arm, theory)
-    wanted = load_requirements(arm) if require is None else require
     options: dict[str, Any] = {
-        "require": wanted,
+        "require": load_requirements(arm) if require is None else require,
         "structure": structure,
         "modes": modes,
         "chain": chain(arm),
@@ -109,6 +113,7 @@ def design(
         RATE_GAIN: k1,
         MOMENT_GAIN: k2,
         ANGLE_GAIN: kp,
+        "weights": dict(weight or ()) or load_weights(arm),
     }
     if trade_off:
         others = {"range": over, "study": study, "posterior": posterior, "continuous": continuous}
@@ -123,12 +128,13 @@ def design(
         ranges=dict(over or []),
         study=study,
         posterior=posterior,
-        fresh=fresh,
+        fresh=64 if fresh is None else fresh,
         **options,
     )
+    case = tfarm.Case(subject, found.law, options["chain"])
     if save is not None:
-        save_law(tfarm.Case(subject, found.law).law, save)
-    show(found, also=(save,))
+        save_law(case.law, save)
+    show(found, also=(save,), summary=case.card())
 
 
 def _emit_front(
@@ -395,10 +401,7 @@ def study_arguments(
 
     # an arm's file names no arm
     if "arm" in file.tables:
-        refuse(
-            typed,
-            f"the study is that of {file.name}; leave this out",
-        )
+        refuse(typed, f"the study is that of {file.name}; leave this out")
         return load_study(file), None
     case, defaults = loop(file)
     known = {key: value for key, value in typed.items() if value is not None}
@@ -453,9 +456,6 @@ def study(
     from tfarm.studies.running import cluster
     from tfarm.studies.study import study as run
 
-    keys = [key for key, _ in over or []]
-    for key in keys:
-        require(keys.count(key) == 1, "--over", key, "is varied twice; once is enough")
     typed = {
         "over": dict(over or []) or None,
         "ask": ask and ask.split(","),
@@ -476,4 +476,5 @@ def study(
         from tfarm.report.study_page import write_study
 
         page = write_study(found)
-    show(found, None if any(key.startswith("law.") for key in keys) else defaults, also=(page,))
+    varies_law = any(key.startswith("law.") for key, _ in over or [])
+    show(found, None if varies_law else defaults, also=(page,))

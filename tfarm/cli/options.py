@@ -304,6 +304,24 @@ def outputs_on(
     return [name if side is None else on_side(name, cast("Any", side)) for name in names], x
 
 
+def weight_entry(text: str) -> tuple[Any, ...]:
+    """Return numerator and denominator of NUM/DEN, coefficients in descending powers of s; of NUM over 1."""
+    num, _, den = text.partition("/")
+    coefficients = numbers("coefficients NUM or NUM/DEN in descending powers of s, such as 0.5,2/1,0.02")
+    return coefficients(num), coefficients(den or "1")
+
+
+WeightEntries = Annotated[
+    list[Any] | None,
+    typer.Option(
+        parser=name_and(weight_entry),
+        metavar="NAME=NUM/DEN",
+        help="weight on S, KS or T, coefficients in descending powers of s; may be repeated, and replaces those of a "
+        "file",
+    ),
+]
+
+
 def refuse(others: Mapping[str, Any], remedy: str) -> None:
     """Raise ParameterError for an option, by its name as a parameter, that another one excludes."""
     for name, value in others.items():

@@ -57,6 +57,7 @@ def emit(
     also: Sequence[Path | None] = (),
     rows: bool = False,
     picture: str | None = None,
+    summary: Any = None,
     *,
     show: Any = emit_record,
     csv: Annotated[
@@ -66,7 +67,7 @@ def emit(
 ) -> None:
     """Write the curves or rows of a record to CSV and its `picture` to a file, then print it.
 
-    The `rows` of the CSV file are printed where they are wanted and not written.
+    The `rows` of the CSV file are printed where they are wanted and not written; `summary` is that of `emit_record`.
     """
     if csv is not None:
         write_file(csv, as_csv(curve_table(record), units=True).encode(), key="--csv")
@@ -76,7 +77,8 @@ def emit(
 
         draw = getattr(plots, picture).figure if picture else plots.style.FIGURES[type(record)]
         plots.files.save_picture(draw, record, png)
-    show(record, defaults, (*also, csv, png), curve_table(record) if rows and csv is None else None)
+    table = curve_table(record) if rows and csv is None else None
+    show(record, defaults, (*also, csv, png), table, summary)
 
 
 def emit_loop(picture: str, file: ArmFile, loop: Any, chain: Any, show: Any) -> None:

@@ -24,6 +24,8 @@ STREAMED = ("--csv", "--figure", "--png", "--mat", "--save")
 WRITTEN = (*STREAMED, "--animate")
 # such as 1_0
 PATHS = (*WRITTEN, "--out", "--tuned", "--dsp", "--law", "--controller", "--list", "--posterior")
+# NAME=VALUE, one a name
+BY_NAME = ("--range", "--weight", "--over", "--start", "--bounds", "--prior", "--vary")
 # of the help, in its order
 CHAPTERS = ("Arm", "Loop", "Design", "Measure", "Study", "Report")
 
@@ -152,6 +154,9 @@ def check_words(arguments: list[str]) -> None:
     if "--json" in words:
         takers.append("--json")
     files = [text for option, text in options if option in WRITTEN and text != STANDARD_OUTPUT]
+    named = [(option, text.partition("=")[0]) for option, text in options if option in BY_NAME]
+    for option, name in named:
+        require(named.count((option, name)) == 1, option, name, "is given twice; once is enough")
     for option, text in options:
         if option not in PATHS:
             # numbers to Python alone: 5_0, or other digits
@@ -167,6 +172,7 @@ def check_words(arguments: list[str]) -> None:
         if option in WRITTEN:
             require(files.count(text) <= 1, option, text, "two results in one file: name another")
             require(Path(text).parent.is_dir(), option, text, "is in no folder: make that first")
+            require(not Path(text).is_dir(), option, text, "is a folder: give the name of a file")
 
 
 def usage(error: Any) -> str:

@@ -304,7 +304,7 @@ def law_in_z(law: Law, acting: Law, chain: Chain) -> LawInZ:
     """
     law = acting if chain.converters.is_single else law
     acting = with_estimate(acting, chain)
-    alone = [acting.weighted(row).matrices() for row in np.eye(len(acting.parts)).tolist()]
+    alone = [acting.with_factors(row).matrices() for row in np.eye(len(acting.parts)).tolist()]
     A, B, _, _ = alone[0]
     C = np.vstack([each[2] for each in alone])
     D = np.vstack([each[3] for each in alone])

@@ -16,7 +16,7 @@ import numpy as np
 
 from tfarm.arm.chain import Chain
 from tfarm.arm.reading import decode_text
-from tfarm.arrays import Real
+from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError, name_file, require
 from tfarm.files import read_file
 
@@ -26,6 +26,23 @@ if TYPE_CHECKING:
 # the s-curve's steps of y''': shares of the rise time, and sizes; those of y'' of a bang-bang profile
 JERK_STEPS = ((0.0, 0.25, 0.75, 1.0), (32.0, -64.0, 64.0, -32.0))
 ACCELERATION_STEPS = ((0.0, 0.5, 1.0), (4.0, -8.0, 4.0))
+# steps of derivatives of the profiles of limited jerk: the order of the derivative, shares of the rise time, and sizes
+STEPS: dict[str, tuple[tuple[int, tuple[float, ...], tuple[float, ...]], ...]] = {
+    "s-curve": ((3, *JERK_STEPS),),
+    "polynomial": (
+        (3, (0.0, 1.0), (60.0, -60.0)),
+        (4, (0.0, 1.0), (-360.0, -360.0)),
+        (5, (0.0, 1.0), (720.0, -720.0)),
+    ),
+}
+
+
+def transform_of_profile(profile: str, s: Complex) -> Complex:
+    """Return the Laplace transform of the share y at s (n,) of a profile of limited jerk, in the rise time 1."""
+    found = 0 * s
+    for order, shares, sizes in STEPS[profile]:
+        found += np.exp(np.multiply.outer(s, -np.array(shares))) @ sizes / s ** (order + 1)
+    return found
 
 
 def motion_of_slew(chain: Chain, reach: float, t: Real) -> tuple[Real, Real]:
@@ -72,15 +89,15 @@ def profile_of_file(path: str) -> "CubicSpline":
             raise ParameterError(key="reference.file", value=lines[:1], remedy=remedy) from None
         require(table.ndim == 2 and table.shape[1] == 2, "reference.file", lines[:1], remedy)
         t, angle = table.T
+        # of times and angles: those of no slew are larger
+        largest = 1e9
+        is_finite = len(t) >= 4 and (abs(table) <= largest).all()
+        require(is_finite, "reference.file", lines[:4], "give at least four lines of finite numbers")
         require(
-            len(t) >= 4 and np.isfinite(table).all(), "reference.file", len(t), "at least four finite points"
+            (np.diff(t) > 0).all(), "reference.file", lines[:4], "give times that increase from line to line"
         )
-        require(
-            (np.diff(t) > 0).all(), "reference.file", t.tolist()[:3], "times that increase from line to line"
-        )
-        require(
-            angle[-1] != angle[0], "reference.file", float(angle[0]), "an end at another angle than the start"
-        )
+        remedy = "give an end at another angle than the start"
+        require(abs(angle[-1] - angle[0]) * largest > np.ptp(angle), "reference.file", lines[-1], remedy)
     return CubicSpline(
         (t - t[0]) / (t[-1] - t[0]), (angle - angle[0]) / (angle[-1] - angle[0]), bc_type="clamped"
     )

@@ -363,7 +363,7 @@ def simulate(
     algebraic loop, an unknown signal, a law in z whose period is not the chain's, and as `scenario` does.
     """
     case = Case(arm, law, chain)
-    return simulated_run(
+    return simulate_scenario(
         case, scenario_name, duration, count=count, between=between, outputs=outputs
     ).simulation
 
@@ -393,7 +393,7 @@ def simulate_modes(
     return run(Simulator(case, task, count=used.modes, between=between, outputs=outputs)), used
 
 
-def simulated_run(
+def simulate_scenario(
     case: Case,
     name: str,
     duration: float,

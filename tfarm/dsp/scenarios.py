@@ -11,6 +11,7 @@ from tfarm.arm import AT_HUB, AnyLaw, Arm, must_turn
 from tfarm.arm.chain import PERIOD, TIME_ROUNDING, Chain, MomentReading
 from tfarm.arm.checks import positive
 from tfarm.arrays import Real
+from tfarm.dsp.inverse import inverse_torque
 from tfarm.dsp.plant import arm_under_chain
 from tfarm.dsp.profiles import motion_of_slew
 from tfarm.dsp.shaping import impulses_of
@@ -90,7 +91,8 @@ class Scenario:
 def slew_scenario(arm: Arm, chain: Chain, duration: float) -> Scenario:
     """Return the slew of a chain's profile, without its shaper: means over a sample, fed forward with J.
 
-    On a rig also friction, back-EMF and analog damping at the mean rate, all in the unit of its input.
+    Or with the exact inverse at the hub (`inverse_torque`), or without.  On a rig also friction, back-EMF and analog
+    damping at the mean rate, all in the unit of its input.
     The rigid arm's moment is -(J - I_h) theta_dd_ref of the interval before the sample.  Raises ParameterError for an
     arm that cannot turn.
     """
@@ -101,10 +103,15 @@ def slew_scenario(arm: Arm, chain: Chain, duration: float) -> Scenario:
     t = np.float64(T) * np.arange(_samples(duration, T) + 1)
     rate, mean = motion_of_slew(chain, arm.reach, t)
     acceleration = np.diff(rate) / T
+    torque = {
+        "rigid": lambda: arm.turned_inertia * acceleration + arm.rate_loss * mean,
+        "inverse": lambda: inverse_torque(arm, chain, mean.size),
+        "none": lambda: 0 * mean,
+    }
     return Scenario(
         name="slew",
         period=T,
-        feedforward=arm.turned_inertia * acceleration + arm.rate_loss * mean,
+        feedforward=torque[chain.reference.feedforward](),
         hub_angle=np.r_[0.0, np.cumsum(mean * T)][:-1],
         hub_rate=rate[:-1],
         rigid_moment=-arm.gauged_inertia * np.r_[0.0, acceleration[:-1]],

@@ -18,7 +18,7 @@ The poles are those of the loop under its whole law, each followed from that of 
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from tfarm.arm.chain import TIME_ROUNDING, Chain
 from tfarm.arrays import Complex, Real
 from tfarm.case import Case
 from tfarm.dsp.branches import follow_branches, match_poles
-from tfarm.dsp.discretise import LawInZ, acting_law, law_in_z
+from tfarm.dsp.discretise import acting_law, law_in_z
 from tfarm.dsp.plant import USUAL_MODES
 from tfarm.dsp.pulse import PulseTransfer
 from tfarm.dsp.sensed import sensed_plant
@@ -90,56 +90,21 @@ def share_left(impulses: Real, z: Complex | complex) -> Any:
     return abs(np.polyval(impulses[::-1], 1 / z))
 
 
-class LoopMatrix(NamedTuple):
-    """A sampled loop as x_{k+1} = (plant - push by_states) x_k + push (r_k + through ref_k) - read ref_k.
-
-    The states are those of `pulse`, then those of the law; `ref` are the references of the signals of `in_z`.  `moment`
-    is the row of the arm's own root moment.
-    """
-
-    pulse: PulseTransfer
-    in_z: LawInZ
-    plant: Real
-    push: Real
-    by_states: Real
-    through: Real
-    read: Real
-    moment: Real
-
-    def under(self, share: float) -> Real:
-        """Return the matrix under a factor on the law."""
-        return self.plant - share * np.outer(self.push, self.by_states)
-
-
-def loop_matrix(case: Case, count: int = USUAL_MODES) -> LoopMatrix:
-    """Return the sampled loop of a case with `count` flexible modes."""
-    acting, chain = acting_law(case, case.feedback)
-    in_z = law_in_z(case.feedback, acting, chain)
-    sensed = sensed_plant(case.arm, chain, tuple(dict.fromkeys((*in_z.signals, MOMENT))), count)
-    pulse = PulseTransfer(sensed.together, chain.sampling).without_fast_poles()
-    A, B, C = pulse.matrices()
-    C = C[: len(in_z.signals)]
-    own, read, row, through = in_z.matrices
-    none = np.zeros(len(own))
-    return LoopMatrix(
-        pulse=pulse,
-        in_z=in_z,
-        plant=np.block([[A, np.zeros((len(A), len(own)))], [read @ C, own]]),
-        push=np.r_[B, none],
-        by_states=np.r_[through.sum(axis=0) @ C, row.sum(axis=0)],
-        through=through.sum(axis=0),
-        read=np.r_[np.zeros((len(A), len(C))), read],
-        moment=np.r_[sensed.own_moment(chain.sampling), none],
-    )
-
-
 def loop_modes(case: Case, count: int = USUAL_MODES) -> dict[int, complex]:
     """Return the pole z, Im z > 0, of each flexible mode of the loop below half the sampling rate, by its number.
 
     An overdamped one has none.
     """
-    loop = loop_matrix(case, count)
-    return modes_under(np.array([*map(loop.under, SHARES.tolist())]), modes_alone(loop.pulse))
+    acting, chain = acting_law(case, case.feedback)
+    in_z = law_in_z(case.feedback, acting, chain)
+    sensed = sensed_plant(case.arm, chain, in_z.signals, count)
+    pulse = PulseTransfer(sensed.together, chain.sampling).without_fast_poles()
+    A, B, C = pulse.matrices()
+    own, read, row, through = in_z.matrices
+    open_loop = np.block([[A, np.zeros((len(A), len(own)))], [read @ C, own]])
+    push = np.r_[B, np.zeros(len(own))]
+    fed_back = np.outer(push, np.r_[through.sum(axis=0) @ C, row.sum(axis=0)])
+    return modes_under(open_loop - np.multiply.outer(SHARES, fed_back), modes_alone(pulse))
 
 
 def modes_alone(pulse: PulseTransfer) -> dict[int, complex]:

@@ -19,7 +19,7 @@ import numpy as np
 from tfarm.arm import ANGLE_GAIN, AT_HUB, RATE_GAIN, Arm, HubFeedback
 from tfarm.arm.chain import Chain
 from tfarm.arm.checks import whole
-from tfarm.arm.law import REFERENCE, Law
+from tfarm.arm.law import REFERENCE, Law, of_common_blocks
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.case import Case
 from tfarm.dsp import kernel
@@ -107,7 +107,7 @@ class Simulator:
         admit(kernel.CONSUMER, arm, chain)
         self.case = case
         self.gains = case.gains if case.in_computer.references == AT_HUB else None
-        self.law, self.chain = acting_law(case)
+        self.law, self.chain = acting_law(case, of_common_blocks(case.in_computer))
         # raises for one that is missing
         references_of(self.law, scenario)
         self.scenario = scenario

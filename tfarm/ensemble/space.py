@@ -243,8 +243,8 @@ class Subjects:
     """Arms and loops with other values of some numbers, by their keys.
 
     Keys are those of an arm's file, "sampling.delay_samples" and others of its chain, "law.K1" and other numbers of the
-    controller (`Law.having`), and "tuner.seed" and others of the tuner.  A stated shear modulus stays as it is, but for
-    a Young's modulus that is `fitted`: a fit has changed both.  Raises ParameterError for an unknown one.
+    controller (`Law.with_number`), and "tuner.seed" and others of the tuner.  A stated shear modulus stays as it is,
+    but for a Young's modulus that is `fitted`: a fit has changed both.  Raises ParameterError for an unknown one.
     """
 
     def __init__(self, case: Case, keys: Sequence[str], fitted: Collection[str] = ()) -> None:
@@ -259,7 +259,7 @@ class Subjects:
         self._of_law = _names_after("law.", keys)
         signals = []
         for name in self._of_law.values():
-            case.feedback.having(name, 1.0)
+            case.feedback.with_number(name, 1.0)
             signals.append(OUTPUT_OF.get(name, name).removesuffix(".gain"))
         remedy = "two keys are one number of the controller"
         require(len(set(signals)) == len(signals), "over", [*self._of_law], remedy)
@@ -292,7 +292,7 @@ class Subjects:
             arm = self._arms.at({key: values[key] for key in self._arms.keys})
         law = self.case.feedback
         for key, name in self._of_law.items():
-            law = law.having(name, values[key])
+            law = law.with_number(name, values[key])
         chain = self.case.chain
         for key, (table, name) in self._of_chain.items():
             chain = replace(chain, **{table: replace(getattr(chain, table), **{name: values[key]})})

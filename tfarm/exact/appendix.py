@@ -190,7 +190,7 @@ def roots_near(arm: Arm, omega: float | str | Number, digits: int) -> int:
     It is the change of phase of Delta lambda_1 lambda_2 along a half circle about omega, in half turns.  omega may be a
     text or an mpmath number of any number of digits.
     """
-    undamped = arm.having(damping=0.0)
+    undamped = arm.with_numbers(damping=0.0)
     with mpmath.workdps(2 * digits + FEWEST_DIGITS):
         half_circle = [mpf(omega) * (1 + mpmath.expjpi(mpf(n) / 8) / mpf(10) ** digits) for n in range(9)]
 
@@ -207,7 +207,7 @@ def natural_frequency(arm: Arm, near: float, digits: int) -> Number:
 
     Raises ConvergenceError where two precisions do not agree: at a double frequency.
     """
-    undamped = arm.having(damping=0.0)
+    undamped = arm.with_numbers(damping=0.0)
 
     def real_part(w: Number) -> Number:
         return _smooth(undamped, w).real

@@ -46,6 +46,7 @@ from tfarm.loop.stability import band_of_family, stability
 from tfarm.loop.windows import windows_of
 from tfarm.response import transfer
 from tfarm.spectrum.gains import angle_unit, default_gains
+from tfarm.synthesis.design import recommended_gains
 from tfarm.synthesis.good_region import GoodRegion, good_region
 from tfarm.synthesis.stability_map import BEYOND_PICTURE, sampled_region
 
@@ -109,6 +110,7 @@ def _of_gains(case: Case, start: HubFeedback) -> LiveNumbers:
     continuous = gain_map(arm, across, np.array([y.low - BEYOND_PICTURE, y.high + BEYOND_PICTURE]))
     sampled = sampled_region(arm, x, y, case.chain)
     good = good_region(arm, x, y, case.chain)
+    chosen, _ = recommended_gains(arm, case.chain)
     return {
         **_of_any_law(case.under(reference), corners),
         "names": NAMES,
@@ -124,19 +126,13 @@ def _of_gains(case: Case, start: HubFeedback) -> LiveNumbers:
         "continuous": _areas(continuous),
         "sampled_map": None if sampled is None else _sampled_map(sampled),
         "good": None if good is None else _areas(good),
-        "recommended": None if good is None else _recommended(good),
+        "recommended": chosen.law.by_name if chosen is not None and chosen.is_met else None,
         "sampled_loop": None if sampled is None else sampled_numbers(sampled.loop),
         "slew": slew_numbers(case),
         "lyapunov": arm.is_uniform,
         "default": reference.by_name,
         "outputs": OUTPUT_OF,
     }
-
-
-def _recommended(good: GoodRegion) -> dict[str, float] | None:
-    """Return the gains recommended, if they meet the requirements of the grade good."""
-    found = good.recommended
-    return found.law.by_name if found.is_met else None
 
 
 def _range(axis: Axis) -> LiveNumbers:
@@ -148,8 +144,8 @@ def _of_parts(case: Case) -> LiveNumbers:
     """Return the numbers of the page of a law of rational parts: each gain from a tenth to ten times its value."""
     law = case.law
     gains = {name: value for name, (_, value) in law.part_gains.items()}
-    corners = [case.under(law.weighted(each)) for each in product((0.1, 10.0), repeat=len(gains))]
-    unit = law.weighted([1.0 / value for value in gains.values()])
+    corners = [case.under(law.with_factors(each)) for each in product((0.1, 10.0), repeat=len(gains))]
+    unit = law.with_factors([1.0 / value for value in gains.values()])
     blocks = zip(gains, unit.signals, _blocks(unit), strict=True)
     return {
         **_of_any_law(case, corners, unit),
@@ -278,7 +274,7 @@ def theorem_numbers(arm: Arm, is_quiet: bool, are_gains: bool) -> LiveNumbers:
 
 def _stable_moments(arm: Arm) -> list[float | None]:
     """Return between which K2 no mode is driven by K1 > 0 without damping; None where no limit was found."""
-    found = windows_of(stability(Case(arm, default_gains(arm).having(MOMENT_GAIN, 0.0))), [MOMENT_GAIN])[
+    found = windows_of(stability(Case(arm, default_gains(arm).with_number(MOMENT_GAIN, 0.0))), [MOMENT_GAIN])[
         MOMENT_GAIN
     ]
     return [end if found.end(end) == "edge" else None for end in found.around or (-math.inf, math.inf)]

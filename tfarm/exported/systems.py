@@ -25,7 +25,7 @@ import numpy as np
 
 from tfarm.arm import Arm
 from tfarm.arm.blocks import Matrices, StateSpace
-from tfarm.arm.law import REFERENCE, Part
+from tfarm.arm.law import REFERENCE, Part, of_common_blocks
 from tfarm.arm.stages import Consumer
 from tfarm.arrays import Complex, Real
 from tfarm.case import Case
@@ -83,7 +83,7 @@ class NamedSystem:
 
 def controller_system(case: Case) -> NamedSystem:
     """Return the controller in z, from its signals and then their references to its share of the input."""
-    acting, _ = acting_law(case)
+    acting, _ = acting_law(case, of_common_blocks(case.in_computer))
     parts = tuple(_with_references(part, acting.references) for part in acting.parts)
     acting = with_estimate(replace(acting, parts=parts, references=()), case.chain)
     columns = (*acting.signals, *acting.wanted)
@@ -103,7 +103,7 @@ def _with_references(part: Part, references: tuple[str, ...]) -> Part:
 
 def plant_system(case: Case) -> NamedSystem:
     """Return the sampled plant from its input to the signals of the law and the tip, exact for its modal model."""
-    acting, late = acting_law(case)
+    acting, late = acting_law(case, of_common_blocks(case.in_computer))
     signals = with_estimate(acting, late).signals
     sensed = sensed_plant(case.arm, late, list(dict.fromkeys((*signals, "tip_displacement"))), USUAL_MODES)
     A, B, C = PulseTransfer(sensed.together, late.sampling).without_fast_poles().matrices()

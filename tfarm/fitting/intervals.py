@@ -93,7 +93,7 @@ def confidence_intervals(
             if profile:
                 ends = [profile_end(found, n, end, quantile, held) for end in ends]
             low, high = each.ends(ends)
-            deviation = own * each.per_coordinate(value)
+            deviation = own * (each.size or abs(value))
         elif n in alone:
             low, high = one_sided_interval(found, n, quantile)
             if low is not None:

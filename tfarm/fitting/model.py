@@ -65,10 +65,6 @@ class Parameter:
             return (value - self.start) / self.size
         return math.log(value / self.start)
 
-    def per_coordinate(self, value: float) -> float:
-        """Return the change of a number by a coordinate."""
-        return self.size or abs(value)
-
     @property
     def bounds(self) -> tuple[float, float]:
         """Of the coordinate."""

@@ -109,7 +109,7 @@ def windows_on_circle(loop: Sampled, names: Sequence[str]) -> dict[str, list[Win
     for name, line, found in zip(names, lines, crossings_along(loop.rig.grid, lines), strict=True):
 
         def is_stable(value: float, line: Line = line) -> bool:
-            return loop.weighted((line.others + value * line.alone)[1:].tolist()).is_stable
+            return loop.with_weights((line.others + value * line.alone)[1:].tolist()).is_stable
 
         windows[name] = confirm_intervals(found, 0.0 if name == FACTOR else -math.inf, math.inf, is_stable)
     return windows
@@ -171,7 +171,7 @@ def sampled_map(
 ) -> GainMap:
     """Return the map over two numbers of the law of a loop, x and y (both ascending), all others constant.
 
-    `vary` names them as `Law.having` does, or "K1", "K2" and "Kp" of gains at the hub.  The edges are exact
+    `vary` names them as `Law.with_number` does, or "K1", "K2" and "Kp" of gains at the hub.  The edges are exact
     (D-decomposition) for two gains of its parts, and along such a gain for each value of any other number.  For two
     others poles are counted at every point.  Raises ConvergenceError where crossings and a count by eigenvalues differ.
     """
@@ -184,11 +184,11 @@ def sampled_map(
     if up is None and across is not None:
         mirrored = sampled_map(loop, y, x, (row, column))
         return GainMap(loop, vary, mirrored.y, mirrored.x, mirrored.unstable.T, [])
-    loops = {value: loop.having(column, value) for value in x.tolist()}
+    loops = {value: loop.with_number(column, value) for value in x.tolist()}
     columns = loops.values()
 
     def poles_at(each: Sampled, value: float) -> SampledPoles:
-        return each.having(row, value).poles
+        return each.with_number(row, value).poles
 
     if up is None:
         counts = [[poles_at(each, value).unstable for value in y.tolist()] for each in columns]
@@ -199,7 +199,7 @@ def sampled_map(
         found = [crossings_along(each.rig.grid, [line_of(each, row)])[0] for each in columns]
     else:
         # all loops have one grid, and a count in one column those of the row
-        start = loop.having(column, _off_the_edge(x)).having(row, at)
+        start = loop.with_number(column, _off_the_edge(x)).with_number(row, at)
         lines = [line_of(each, row) for each in columns]
         along, *found = crossings_along(loop.rig.grid, [line_of(start, column), *lines])
         there = start.poles.unstable + along.passed(x) - along.passed(start.number(column))
@@ -247,7 +247,7 @@ def ends_of_K1(loop: Sampled, shares: Sequence[float] = (-0.9, 0.3, 0.9)) -> Rea
     K2 are `shares` of `input_per_torque`.
     """
     unit = loop.plant.arm.input_per_torque
-    windows = (stable_windows(loop.having("K2", unit * share), "K1") for share in shares)
+    windows = (stable_windows(loop.with_number("K2", unit * share), "K1") for share in shares)
     ends = np.unique(np.concatenate([np.ravel(each) for each in windows]))
     return ends[np.isfinite(ends) & (ends != 0)]
 

@@ -158,7 +158,7 @@ class ContinuousLoop(Loop):
     def parts(self, s: NDArray[Any]) -> tuple[Complex, Complex]:
         """Return denominator and numerator of L at s, up to one factor: finite at poles too."""
         s = np.asarray(s, dtype=complex)
-        return self._parts(s, self.signals.kept(s))
+        return self._parts(s, self.signals.recall_parts(s))
 
     def _parts(self, s: Complex, of_rig: LoopParts) -> tuple[Complex, Complex]:
         """Return the same from those of the signals."""
@@ -214,7 +214,7 @@ def rig_parts(signals: Signals, s: Complex) -> LoopParts:
     """Return the terms of the rig at s; those on a long path are kept."""
     # points, and three at each: a contour that the loops of other laws have too
     long_path = 1000
-    return signals.kept(s) if s.size >= long_path else signals.parts(s)
+    return signals.recall_parts(s) if s.size >= long_path else signals.parts(s)
 
 
 def by_differences(
@@ -272,7 +272,7 @@ def steep_places(arm: Arm, up_to: float) -> Any:
     pin = replace(
         arm, hub=replace(arm.hub, inertia=0.0, friction=0.0, stiffness=0.0), motor=None, input="hub_torque"
     )
-    others = (arm, arm.having(hub_inertia=math.inf), pin)
+    others = (arm, arm.with_numbers(hub_inertia=math.inf), pin)
     places = np.unique(np.concatenate([flexible_frequencies(each, up_to) for each in others]))
     places.flags.writeable = False
     return places

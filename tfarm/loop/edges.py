@@ -125,7 +125,7 @@ def log_radius_with(loop: Sampled, C: float, count: int) -> float:
     """Return the log spectral radius at C; where two damped modes are one there, at a C that differs by 1e-6."""
 
     def loop_at(nudge: float) -> Sampled:
-        arm = loop.plant.arm.having(damping=C * (1 + nudge))
+        arm = loop.plant.arm.with_numbers(damping=C * (1 + nudge))
         # 2 modes are kept beyond the last one that does not decay within a sample
         return loop.on(arm, min(count, 2 + count_lasting_modes(arm, loop.chain)))
 
@@ -306,14 +306,14 @@ def shown_windows(loop: Sampled, band: Band | None, name: str) -> list[FigurePai
     gain_digits = 6
 
     def proof(value: float) -> Proof:
-        return _proof(band, loop.having(name, value))
+        return _proof(band, loop.with_number(name, value))
 
     def search(loop: Sampled) -> list[tuple[Limit, Limit]]:
         other = _comparison(loop)
         modes = loop.plant.count
 
         def confirmation(value: float) -> Proof:
-            return other().having(name, value).is_stable, math.inf
+            return other().with_number(name, value).is_stable, math.inf
 
         def edge(value: float, opposite: float, *, below: bool) -> Limit:
             # 1e-6 of the other edge of an interval: distance from 0 at which an edge at 0 is tested
@@ -414,7 +414,7 @@ def damping_limit(loop: Sampled, count: int, digits: int = 4) -> Figure | Limit:
         return Figure(C, digits, None, count)
 
     def proof(value: float) -> Proof:
-        whole = whole_loop(case.on(case.arm.having(damping=value)))
+        whole = whole_loop(case.on(case.arm.with_numbers(damping=value)))
         return _proof(complete_band(whole), whole)
 
     def confirmation(value: float) -> Proof:

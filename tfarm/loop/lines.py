@@ -41,7 +41,7 @@ def with_numbers(law: Law, values: Mapping[str, float]) -> Law:
     Factors act on the new values of the others.
     """
     for name in sorted(values, key=lambda name: (name == "gain", name.endswith("gain"))):
-        law = law.having(name, values[name])
+        law = law.with_number(name, values[name])
     return law
 
 
@@ -62,7 +62,7 @@ class LawTerms:
         self.weights = np.ones(1 + len(law.parts))
         for name, (part, value) in self.gains.items():
             self.weights[1 + part] = value
-            self.law = self.law.having(name, 1.0)
+            self.law = self.law.with_number(name, 1.0)
         self.others = {}
         for name in names:
             if self.part(name) is None and name != "gain":
@@ -70,7 +70,7 @@ class LawTerms:
                 # not 0, as a leading 0 moves the other coefficients
                 small = value * 2.0**-30 or 1.0
                 part = [each.signals for each in law.parts].index((name.rsplit(".", 2)[0],))
-                self.others[name] = value, small, part, self.law.having(name, small).parts[part].block
+                self.others[name] = value, small, part, self.law.with_number(name, small).parts[part].block
 
     def of(self, s: Complex, rig: LoopParts) -> Complex:
         """Return the terms (rows, ...) at places s, from the parts of the signals there."""
@@ -115,7 +115,7 @@ class LawTerms:
         other = np.eye(weights.size)[self.weights.size + list(self.others).index(name)]
         return Line.of(other, (weights - other) / (value - small), small, low, high)
 
-    def having(self, name: str, value: float) -> LawTerms:
+    def with_number(self, name: str, value: float) -> LawTerms:
         """Return the same with another value of the gain of a part."""
         other = copy(self)
         part = self.part(name)
@@ -212,7 +212,7 @@ def _change_at(along: Along, at: float, others: list[Crossing], band: float) -> 
     # 1e-3 of the range: how far from such a place its counts are taken
     step = min([1e-3 * (along.line.high - along.line.low), *(each / 2 for each in away)])
     try:
-        below, above = (unstable_below(loop.having(name, at + side * step), band) for side in (-1, 1))
+        below, above = (unstable_below(loop.with_number(name, at + side * step), band) for side in (-1, 1))
     except ConvergenceError as error:
         why = (
             f"{name}: at {at:.6g} two poles meet at s = 0 and undamped modes are on the axis, so poles cannot be "

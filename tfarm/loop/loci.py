@@ -113,8 +113,8 @@ def open_loop(case: Case, vary: str, count: int) -> control.StateSpace:
         moving = law
         fixed = HubFeedback()
     else:
-        moving = HubFeedback().having(vary, 1.0)
-        fixed = law.having(vary, 0.0)
+        moving = HubFeedback().with_number(vary, 1.0)
+        fixed = law.with_number(vary, 0.0)
     (A, B, C, D), row = _closed_model(case.arm, fixed, count, moving)
     return control.StateSpace(A, B, row @ C, row @ D)
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from tfarm.arm import Arm, HubFeedback, Law, warn_of_cancellations
 from tfarm.arrays import Complex
+from tfarm.moved import FormerName
 from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Quantity
 
@@ -75,9 +76,11 @@ class Loop(ABC):
     def under(self, law: Law) -> Self:
         """Return the loop of the same rig under another law."""
 
-    def having(self, name: str, value: float) -> Self:
+    def with_number(self, name: str, value: float) -> Self:
         """Return the same loop with another value of one number of its law."""
-        return self.under(self.law.having(name, value))
+        return self.under(self.law.with_number(name, value))
+
+    having = FormerName("with_number")
 
     @property
     @abstractmethod

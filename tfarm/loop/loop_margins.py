@@ -282,6 +282,24 @@ def unit_crossings(loop: Loop, omega: Real) -> Real:
     return zeros_between(lambda w, _: size(w), omega[before], omega[before + 1])
 
 
+def bandwidth(loop: Loop, omega: Real) -> float:
+    """Return the lowest frequency [rad/s] from which |T| = |L/(1 + L)| is below 1/sqrt(2), -3 dB.
+
+    The first of the grid where |T| begins below, the last one where it stays above.
+    """
+    inverse = _distance(loop, 0.0, 1.0)
+
+    def size(w: Real) -> Real:
+        return np.asarray(np.log(np.sqrt(0.5) * inverse(w)))
+
+    values = size(omega)
+    if values[0] > 0:
+        return float(omega[0])
+    (before,), _ = brackets(values)
+    found = zeros_between(lambda w, _: size(w), omega[before[:1]], omega[before[:1] + 1])
+    return float(found[0]) if found.size else float(omega[-1])
+
+
 def lowest(
     f: Callable[[Real], Real], omega: Real, most: int = 6, rounds: int = 7, points: int = 17
 ) -> tuple[float, float]:

@@ -22,7 +22,7 @@ import numpy as np
 
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.chain import Chain
-from tfarm.arm.weights import Weights, weights_of
+from tfarm.arm.weights import USUAL_WEIGHTS, Weights, weights_of
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.case import Case
 from tfarm.dsp.discretise import root_product
@@ -423,7 +423,7 @@ def norm(
     """
     # of upper bounds, which are printed with 6 digits
     require(1e-5 <= tolerance < 1, "tolerance", tolerance, "a number from 1e-5 to below 1")
-    wanted = weights_of({"S": 1.0, "T": 1.0} if weights is None else weights)
+    wanted = weights_of(USUAL_WEIGHTS if weights is None else weights)
     verdict = sampled_verdict(Case(arm, law, chain))
     loop = verdict.full
     roots = _roots_of(wanted, loop.period)

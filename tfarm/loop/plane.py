@@ -75,9 +75,9 @@ class BoundaryLines(NamedTuple):
 class Plane(PlaneOfCounts):
     """Unstable poles over a grid of two numbers: `unstable` (len(y), len(x)), -1 where they are infinitely many.
 
-    `vary` names both numbers of `law`, across and up, as `Law.having` does.  `boundary` (n, 3) holds both gains and
-    w [rad/s] of the D-decomposition curve of K1 and K2; empty without losses and of other numbers.  `band` [rad/s] is
-    the frequency range of the crossings, 0 where every mode is known; `crossings` those along y for each x, or none.
+    `vary` names both numbers of `law`, across and up, as `Law.with_number` does.  `boundary` (n, 3) holds both gains
+    and w [rad/s] of the D-decomposition curve of K1 and K2; empty without losses and of other numbers.  `band` [rad/s]
+    is the frequency range of the crossings, 0 where every mode is known; `crossings` those along y for each x, or none.
     """
 
     loop: ContinuousLoop
@@ -174,7 +174,7 @@ class Plane(PlaneOfCounts):
         if not self.is_known:
             return super().stable_intervals
         limits = float(self.y[0]), float(self.y[-1])
-        loop = self.loop.having(RATE_GAIN, self.upright + default_gains(self.arm).K1)
+        loop = self.loop.with_number(RATE_GAIN, self.upright + default_gains(self.arm).K1)
         stable = theorem_windows(loop, MOMENT_GAIN, limits, theorem_edges(loop, MOMENT_GAIN, limits))
         return [stable if self.upright < K1 else [] for K1 in self.x]
 
@@ -257,7 +257,7 @@ def plane(loop: ContinuousLoop, vary: tuple[str, str], x: Real, y: Real) -> Plan
     found = _columns(loop, vary, x, searched, band)
     crossing = np.concatenate([y[:0], *(each.gain for each in found)])
     at = 0.0 if vary == PLANE else float(y[_farthest(y, crossing)])
-    there = _counts_across(loop.having(vary[1], at), vary[0], x, band)
+    there = _counts_across(loop.with_number(vary[1], at), vary[0], x, band)
     unstable = counts_over(y, found, at, there).T.copy()
     edge = boundary(loop, np.asarray(grid(loop.arm, band))) if is_of_gains else np.empty((0, 3))
     done = Plane(loop, vary, x, y, unstable, edge, band, found)
@@ -284,9 +284,9 @@ def _columns(
     """Return the crossings along the second number at each value of the first; of gains of parts all at once."""
     terms = LawTerms(loop.signals, loop.law, [])
     if None in map(terms.part, vary):
-        return [line_crossings(loop.having(vary[0], value), vary[1], *up, band) for value in x.tolist()]
-    lines = [terms.having(vary[0], value).line(vary[1], *up) for value in x.tolist()]
-    members = (partial(loop.having, vary[0], value) for value in x.tolist())
+        return [line_crossings(loop.with_number(vary[0], value), vary[1], *up, band) for value in x.tolist()]
+    lines = [terms.with_number(vary[0], value).line(vary[1], *up) for value in x.tolist()]
+    members = (partial(loop.with_number, vary[0], value) for value in x.tolist())
     loops = [Along(member, vary[1], line) for member, line in zip(members, lines, strict=True)]
     return [column() for column in cross_axis(loop.arm, terms, band, loops)]
 
@@ -304,7 +304,7 @@ def _is_known_everywhere(loop: ContinuousLoop) -> bool:
 def _known_counts(loop: ContinuousLoop, K1: Real, K2: Real) -> NDArray[np.int64]:
     """Return unstable poles without damping: one count for each side of each line on which modes meet the axis."""
     limits = float(K2[0]), float(K2[-1])
-    static = static_edge(loop.having(RATE_GAIN, default_gains(loop.arm).K1), MOMENT_GAIN, limits)
+    static = static_edge(loop.with_number(RATE_GAIN, default_gains(loop.arm).K1), MOMENT_GAIN, limits)
     unstable = np.zeros((K2.size, K1.size), dtype=np.int64)
     side = np.sign(K1 + loop.arm.rate_loss) + 3 * np.sign(K2 - loop.arm.input_per_torque)[:, None]
     if static is not None:
@@ -320,10 +320,10 @@ def _known_counts(loop: ContinuousLoop, K1: Real, K2: Real) -> NDArray[np.int64]
 def _counts_across(row: ContinuousLoop, name: str, x: Real, band: float) -> NDArray[np.int64]:
     """Return unstable poles at each x along a row, from one count far from its crossings; of a delay one at each."""
     if name == "delay":
-        return np.array([unstable_below(row.having(name, value), band) for value in x.tolist()])
+        return np.array([unstable_below(row.with_number(name, value), band) for value in x.tolist()])
     across = line_crossings(row, name, float(x[0]), float(x[-1]), band)
     start = float(x[_farthest(x, across.gain)])
-    return unstable_below(row.having(name, start), band) + across.passed(x) - across.passed(start)
+    return unstable_below(row.with_number(name, start), band) + across.passed(x) - across.passed(start)
 
 
 def _farthest(values: Real, at: Real) -> int:
@@ -435,5 +435,5 @@ def static_edges(found: Plane) -> tuple[float | None, float | None]:
     upright = found.upright if found.arm.has_rigid_mode and found.Kp == 0 else None
     loop = found.loop
     up = float(abs(found.y).max())
-    level = static_edge(loop.having(RATE_GAIN, 1.0), MOMENT_GAIN, (-up, up))
+    level = static_edge(loop.with_number(RATE_GAIN, 1.0), MOMENT_GAIN, (-up, up))
     return upright, None if level is None else level.t

@@ -23,6 +23,7 @@ from tfarm.digits import DOUBLE_DIGITS
 from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.loop.continuous import ContinuousLoop, frequency_above_mode, steep_places
 from tfarm.loop.theorem import Energy
+from tfarm.moved import FormerName
 from tfarm.records import frozen
 from tfarm.reduced.modal import closed_loop_matrix, in_series, pade
 from tfarm.response.frequency import AXIS_SHARE
@@ -107,18 +108,22 @@ class Poles:
         return count_with_mirrors(self.values)
 
     @property
-    def moving(self) -> Complex:
+    def nonzero(self) -> Complex:
         """The poles apart from those at 0, where that of a free hub angle is."""
         return self.values[self.values != 0]
+
+    moving = FormerName("nonzero")
 
     @property
     def spectral_abscissa(self) -> float:
         """The largest real part [1/s] in the box, apart from poles at 0."""
-        return float(self.moving.real.max(initial=-np.inf))
+        return float(self.nonzero.real.max(initial=-np.inf))
 
-    def certified(self, digits: int = DOUBLE_DIGITS) -> Poles:
+    def with_discs(self, digits: int = DOUBLE_DIGITS) -> Poles:
         """Return the same with the discs of `certify`."""
         return replace(self, discs=self.certify(digits))
+
+    certified = FormerName("with_discs")
 
     def certify(self, digits: int = DOUBLE_DIGITS) -> tuple[Disc, ...]:
         """Return a disc around each pole with Im >= 0 apart from 0, proven to contain all poles of the box.
@@ -127,7 +132,7 @@ class Poles:
         """
         k = self.loop.k
         law = self.loop.exact
-        discs = tuple(enclose_zero(k, complex(pole), digits, law) for pole in self.moving)
+        discs = tuple(enclose_zero(k, complex(pole), digits, law) for pole in self.nonzero)
         if not disjoint(discs):
             raise CertificationError("the discs of two poles touch: ask for more digits")
         proven = proven_count(k, self.box, law)

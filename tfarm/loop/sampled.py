@@ -35,6 +35,7 @@ from tfarm.errors import ParameterError, did_you_mean
 from tfarm.loop.loop import Loop
 from tfarm.loop.sampled_poles import SampledPoles, polish_poles
 from tfarm.loop.sampled_rig import SampledRig
+from tfarm.moved import FormerName
 from tfarm.records import frozen
 from tfarm.response.signals import ControllerSignals
 from tfarm.schema import Quantity
@@ -87,7 +88,7 @@ class Sampled(Loop):
     @cached_property
     def law(self) -> Law:
         """The law with its weights."""
-        return self.unit_law.weighted(self.weights)
+        return self.unit_law.with_factors(self.weights)
 
     @property
     def is_of_gains(self) -> bool:
@@ -113,7 +114,7 @@ class Sampled(Loop):
         return any(self.weights)
 
     def place(self, name: str) -> int | None:
-        """Return the part whose weight is a number, by its name in `Law.having`; None of any other number."""
+        """Return the part whose weight is a number, by its name in `Law.with_number`; None of any other number."""
         known = self.unit_law.part_gains
         name = OUTPUT_OF.get(name, name).removesuffix(".gain")
         return next((known[key][0] for key in (name, f"{name}.gain") if key in known), None)
@@ -130,22 +131,24 @@ class Sampled(Loop):
             raise ParameterError(key="law", value=name, remedy=remedy)
         return place
 
-    def weighted(self, weights: Sequence[float]) -> Sampled:
+    def with_weights(self, weights: Sequence[float]) -> Sampled:
         """Return the same loop with other weights."""
         return replace(self, weights=tuple(weights))
 
-    def having(self, name: str, value: float) -> Sampled:
+    weighted = FormerName("with_weights")
+
+    def with_number(self, name: str, value: float) -> Sampled:
         """Return the same loop with another value of one number of its law; cheap where that is a gain or factor."""
         place = self.place(name)
         if place is None:
-            return super().having(name, value)
+            return super().with_number(name, value)
         weights = [*self.weights]
         weights[place] = value
-        return self.weighted(weights)
+        return self.with_weights(weights)
 
     def times(self, factor: float) -> Sampled:
         """Return the same loop with a factor on the whole law."""
-        return self.weighted([factor * each for each in self.weights])
+        return self.with_weights([factor * each for each in self.weights])
 
     def with_delay(self, samples: float) -> Sampled:
         """Return the same loop with another total delay."""
@@ -304,7 +307,7 @@ def sampled_loop(case: Case, *, count: int = USUAL_MODES) -> Sampled:
     units = acting.part_gains
     for name, (place, value) in units.items():
         weights[place] = value
-        law, acting = (each.having(name, 1.0) for each in (law, acting))
+        law, acting = (each.with_number(name, 1.0) for each in (law, acting))
     in_z = law_in_z(law, acting, chain)
     sensed = sensed_plant(case.arm, chain, in_z.signals, count)
     return Sampled(SampledRig(sensed, chain, in_z), law, tuple(weights))

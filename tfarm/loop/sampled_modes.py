@@ -253,7 +253,7 @@ def sampled_locus(loop: Sampled, gain: str, values: Real) -> SampledLocus:
     """Return the locus of a number at these values, at that of the loop, and between where a branch turns."""
 
     def poles_at(value: float) -> Complex:
-        z = loop.having(gain, value).poles.z
+        z = loop.with_number(gain, value).poles.z
         # 1e-12: imaginary part of a real z: rounding
         return np.where(abs(z.imag) <= 1e-12, z.real, z)
 
@@ -269,7 +269,7 @@ def sampled_locus(loop: Sampled, gain: str, values: Real) -> SampledLocus:
         if not bent.any():
             break
         wanted = (values[:-1] + values[1:])[bent] / 2
-    first = loop.having(gain, float(values[0]))
+    first = loop.with_number(gain, float(values[0]))
     origin = origins(first)
     modes = np.r_[loop.pulse.mode, np.zeros(loop.in_z.poles.size, np.int64)]
     mode = np.where(origin < 0, 0, modes[origin])

@@ -31,7 +31,8 @@ FADED_RADIUS = 0.2
 class SampledPoles:
     """Closed-loop poles `z` and `log_radius` ln|z| of each, without z = 1 of a free hub angle.
 
-    `error` bounds the error of each z; where ln|z| may be no more than that, it is 0.
+    `error` bounds the error of each z outside FADED_RADIUS; where ln|z| may be no more than that, it is 0.  Inside are
+    eigenvalues: where C is large, of modes fitted by `slow_remainder`, whose shares have few digits.
     `mode` is the flexible mode of the open-loop pole that is nearest (0: none).
     """
 

@@ -54,7 +54,7 @@ class Spill:
         self,
     ) -> Annotated[Complex, Quantity("s", "1/s", key="driven", help="unstable poles of the exact loop")]:
         """The exact loop's unstable poles, ascending in Im s."""
-        return _right_of_axis(self.verdict.poles.moving)
+        return _right_of_axis(self.verdict.poles.nonzero)
 
     @property
     def driven(self) -> Complex:

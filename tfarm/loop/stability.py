@@ -128,7 +128,7 @@ class Stability(LoopVerdict):
         self,
     ) -> Annotated[str | None, Quantity("free hub angle", help="pole at 0 that verdicts leave out")]:
         """The pole at 0 that the verdict leaves out."""
-        if self.poles.moving.size < self.poles.values.size:
+        if self.poles.nonzero.size < self.poles.values.size:
             return "its pole at s = 0 is left out"
         return None
 
@@ -167,7 +167,7 @@ class Stability(LoopVerdict):
     @property
     def oscillating_poles(self) -> list[tuple[int, complex]]:
         """The oscillating poles by mode."""
-        moving = self.poles.moving
+        moving = self.poles.nonzero
         oscillating = moving[moving.imag > 0]
         table = modes(self.loop.arm, up_to=self.band)
         own = zip(table.index.tolist(), (1j * table.natural_frequency).tolist(), strict=True)
@@ -191,7 +191,7 @@ class Stability(LoopVerdict):
         near = np.geomspace(0.05, 20.0, 12)
         close = poles.imag[:, None] + abs(poles.real[:, None]) * np.r_[-near, 0.0, near]
         # |L| may cross 1 down to a twentieth of the slowest pole
-        slowest = abs(self.poles.moving).min(initial=omega[0])
+        slowest = abs(self.poles.nonzero).min(initial=omega[0])
         slow = np.geomspace(0.05 * slowest, omega[0], 400) if slowest < omega[0] else omega[:0]
         return np.unique(np.r_[omega, close[(close > 0) & (close < omega[-1])], slow])
 
@@ -200,7 +200,7 @@ class Stability(LoopVerdict):
         """Up the axis to the band, and around the right part of the box in which the poles were counted."""
         loop = self.loop
         band = self.band
-        moving = self.poles.moving
+        moving = self.poles.nonzero
         own = loop.law.poles
         omega = np.asarray(grid(loop.arm, band))
         ringing = own[own.imag > 0]
@@ -267,7 +267,10 @@ def verdict_on(loop: ContinuousLoop, band: float | None = None) -> Stability:
     # of 1/delay: poles are listed up to there on the left; further left are more and more, all stable
     listed_left = 0.5
     theorem = loop.theorem
-    height, is_small = (band, False) if band is not None else band_of_loop(loop)
+    height = band
+    is_small = False
+    if height is None:
+        height, is_small = band_of_loop(loop)
     poles = poles_below(loop, height, listed_left)
     is_known = True
     is_infinite = theorem.energy == Energy.SUPPLY
@@ -290,7 +293,7 @@ def _word_of(poles: Poles, is_infinite: bool) -> str:
 
     Raises ConvergenceError where one of a damped loop may be on the axis, and none is right of it.
     """
-    moving = poles.moving
+    moving = poles.nonzero
     arm = poles.loop.arm
     share = moving.real / abs(moving)
     if is_infinite or (share > MARGIN_OF_ZERO).any():
@@ -407,7 +410,7 @@ def is_known_without(loop: ContinuousLoop, name: str) -> bool:
     of 0 do not follow from those on the other.
     """
     try:
-        without = loop.having(name, 0.0)
+        without = loop.with_number(name, 0.0)
         return without.theorem.energy in (Energy.LOSS, Energy.CONSTANT) or band_of_loop(without)[1]
     except (ParameterError, ConvergenceError):
         return False

@@ -56,7 +56,7 @@ Title = tuple[str, str]
 class Varied:
     """The loops of a case, with the number `vary` from `start` to `stop`.
 
-    `vary` is a number of the law as `Law.having` names it, "all" (a factor on it), or of the arm.  Raises
+    `vary` is a number of the law as `Law.with_number` names it, "all" (a factor on it), or of the arm.  Raises
     ParameterError for another name, and where there is no loop.
     """
 
@@ -130,7 +130,7 @@ class Varied:
         """Return the law where the number has that value."""
         if self.is_of_arm:
             return self.full
-        return self.full.having("gain" if self.vary == "all" else self.vary, value)
+        return self.full.with_number("gain" if self.vary == "all" else self.vary, value)
 
     def at(self, value: float) -> ContinuousLoop:
         """Return the loop where the number has that value."""
@@ -144,7 +144,7 @@ class Varied:
 
         @lru_cache(200)
         def loop_of_arm(value: float) -> ContinuousLoop:
-            return ContinuousLoop(self.case.on(self.case.arm.having(**{self.vary: value})))
+            return ContinuousLoop(self.case.on(self.case.arm.with_numbers(**{self.vary: value})))
 
         return loop_of_arm
 
@@ -254,10 +254,14 @@ class Varied:
         return np.r_[upper, upper[upper.imag > 0].conj()]
 
     def singular(self, values: Real) -> Real:
-        """Return -1/C of the damped segments, at m values (m, p)."""
+        """Return -1/C of the damped segments, at m values (m, p); NaN where there are fewer of them."""
         if not self.is_of_arm:
             return np.tile(np.array(self.first.k.singular), (values.size, 1))
-        return np.array([self.at(float(value)).k.singular for value in values])
+        points = [self.at(float(value)).k.singular for value in values]
+        found = np.full((values.size, max(map(len, points))), np.nan)
+        for row, each in zip(found, points, strict=True):
+            row[: len(each)] = each
+        return found
 
     # ------------------------------------------------------------ complete in a box
 

@@ -184,7 +184,7 @@ def _lines(verdict: Stability, ranges: dict[str, Window]) -> tuple[dict[str, Cal
     if verdict.is_known_beyond or loop.is_of_gains:
         loops: list[ContinuousLoop] = []
         for name, pair in ranges.items():
-            loops += [loop.having(name, end) for end in critical(name, pair)]
+            loops += [loop.with_number(name, end) for end in critical(name, pair)]
         band = max(band, band_of_family(loops)[0])
     terms = LawTerms(loop.signals, loop.law, ranges)
     lines = [Along(lambda: loop, name, terms.line(name, *pair)) for name, pair in ranges.items()]
@@ -210,13 +210,13 @@ def _stable(verdict: Stability, name: str, limits: Window, found: Crossings, ban
         count += resting[0] > 0
     elif not (is_known and any(low < value < high for low, high in pairs)):
         at = sum(pairs[len(pairs) // 2]) / 2
-        there = verdict_on(loop.having(name, at), band)
+        there = verdict_on(loop.with_number(name, at), band)
         count = 0 if there.is_stable else max(1, there.unstable_roots)
     stable = intervals(found, *limits, at, count)
     if not (loop.is_of_gains or verdict.is_known_beyond):
 
         def unstable_at(number: float) -> int:
-            return unstable_below(loop.having(name, number), band)
+            return unstable_below(loop.with_number(name, number), band)
 
         carried = count + found.passed(np.array(limits)) - found.passed(at)
         if carried.tolist() != [unstable_at(end) for end in limits]:
@@ -272,7 +272,9 @@ def theorem_edges(loop: ContinuousLoop, name: str, limits: Window) -> Crossings:
 def theorem_windows(loop: ContinuousLoop, name: str, limits: Window, edges: Crossings) -> list[Window]:
     """Return the stability intervals of such a gain: every mode is damped, and the static stiffness is positive."""
     pairs = edges.spans(*limits)
-    return join_neighbours([pair for pair in pairs if is_proven_stable(loop.having(name, sum(pair) / 2))])
+    return join_neighbours(
+        [pair for pair in pairs if is_proven_stable(loop.with_number(name, sum(pair) / 2))]
+    )
 
 
 def is_proven_stable(loop: ContinuousLoop) -> bool:
@@ -288,7 +290,11 @@ def is_proven_stable(loop: ContinuousLoop) -> bool:
 def _with_proven_ends(loop: ContinuousLoop, name: str, pair: Window, limits: Window) -> Window:
     """Return the interval with ends of the search replaced by infinity where a theorem holds beyond them."""
     end = 0 if name == MOMENT_GAIN else 1
-    if not loop.is_of_gains or pair[end] != limits[end] or not is_proven_stable(loop.having(name, pair[end])):
+    if (
+        not loop.is_of_gains
+        or pair[end] != limits[end]
+        or not is_proven_stable(loop.with_number(name, pair[end]))
+    ):
         return pair
     low, high = pair
     return (low, math.inf) if end else (-math.inf, high)

@@ -15,7 +15,7 @@ def trade_off(found: TradeOff, *, ax: Axes) -> None:
     robustness = np.array([each.robustness for each in found.points])
     speed = np.array([each.time_constant for each in found.points])
     is_met = np.array([each.is_met for each in found.points])
-    ax.set(yscale="log", xlabel="robustness: limits over those of the grade good")
+    ax.set(yscale="log", xlabel="robustness, limits over those of the grade good [−]")
     ax.set(ylabel="dominant time constant of the sampled loop [s]")
     ax.axvline(1.0, color=GREY, lw=1.0, ls=(0, (5, 3)), label="good: 6 dB, 45°, one period, Ms 2")
     ax.plot(

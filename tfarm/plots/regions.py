@@ -357,10 +357,13 @@ def draw_stability_map(data: StabilityMap, laws: Sequence[MarkedLaw], *, ax: Axe
 def _draw_good(found: GoodRegion, ax: Axes) -> None:
     """Fill the gains whose margins have the grade good in both loops."""
     words = "grade good in both loops, approximate"
-    if not found.met.any():
+    parts = pieces(found.x, found.stable_intervals)
+    if not parts:
         words += ": none found on the grid"
     key_area(words, ax, facecolor=GOOD, alpha=0.55, lw=0)
-    ax.contourf(found.x, found.y, found.excess, (-np.inf, 0.0), colors=[GOOD], alpha=0.55, zorder=2.2)
+    for piece in parts:
+        x, low, high = np.array(piece.points).T
+        ax.fill_between(x, low, high, facecolor=GOOD, alpha=0.55, lw=0, zorder=2.2)
 
 
 def _draw_lyapunov(is_undamped: bool, x: Axis, y: Axis, ax: Axes) -> None:

@@ -4,12 +4,8 @@ The frequency error e is one of the whole arm: moduli of every link and stiffnes
 so that each frequency of the arm alone is (1 + e) times its own, but for rotary damping.  Controller, references and
 impulses stay those of the nominal arm.  The loop is sampled, with its converters.
 
-After the slew the root moment of the linear loop is a sum over its poles of amplitude times z^k, so that
-
-    |M_k| <= sum over poles of |moment v_i| |w_i x_N|,   v_i, w_i the right and left eigenvectors
-
-at every sample after the end N, where the references are constant.  With the value at N itself that is a bound on the
-residual for the modes of the model; the modes left out are not in it.
+The bound on the residual at every sample after the slew is that of `bounds`, for the arm itself and for ranges of its
+numbers: every mode of a band is in it, those left out with a bound of their own.
 """
 
 import math
@@ -21,18 +17,21 @@ import numpy as np
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.chain import Chain
 from tfarm.arm.checks import number
-from tfarm.arrays import Real
+from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.case import Case
 from tfarm.dsp import kernel
 from tfarm.dsp.results import simulate_modes
 from tfarm.dsp.scenarios import Scenario, slew_scenario
-from tfarm.dsp.shaping import impulses_at, loop_matrix, loop_modes, share_left
+from tfarm.dsp.shaping import impulses_at, loop_modes, share_left
 from tfarm.dsp.simulate import Simulator
 from tfarm.dsp.stages import admit_case
-from tfarm.errors import ConvergenceError, require
+from tfarm.errors import CertificationError, ConvergenceError, require
 from tfarm.records import frozen
+from tfarm.references.bounds import Ranges, SlewBounds, check_ranges, range_words
 from tfarm.response.signals import ControllerSignals, controller
 from tfarm.schema import Column, Percent, Quantity, Table
+from tfarm.spectrum import modes
+from tfarm.spectrum.damped import damped_modes
 from tfarm.spectrum.table import first_frequency
 
 
@@ -61,6 +60,24 @@ class ShapedMode(NamedTuple):
     ]
 
 
+class RangeBound(NamedTuple):
+    """The bound on the residual of every arm with numbers in some ranges."""
+
+    ranges: Annotated[str, Quantity("ranges", help="numbers of the arm by key, with both ends")]
+    bound: Annotated[
+        float | None,
+        Quantity(
+            "bound",
+            "N m",
+            4,
+            help="above the residual root moment of every arm; null where none is certified",
+        ),
+    ]
+    certainty: Annotated[
+        str, Quantity("certainty", help="frequency and number of boxes of arms, or why there is none")
+    ]
+
+
 @frozen
 class ShapedReference:
     """The reference of a slew: impulses, modes, and the residual root moment over the error of the frequency.
@@ -71,6 +88,28 @@ class ShapedReference:
     controller: Annotated[ControllerSignals, Quantity(flat=True, help="arm and controller of the loop")]
     profile: Annotated[str, Quantity("profile", help="of the slew before the shaper")]
     shaper: Annotated[str, Quantity("shaper", help="none, ZV, ZVD or EI")]
+    feedforward: Annotated[
+        str,
+        Quantity("feedforward", help="torque of the rigid arm, inverse of the exact one at the hub, or none"),
+    ]
+    torque_after: Annotated[
+        float,
+        Quantity(
+            "feedforward after the slew",
+            "N m",
+            4,
+            help="its largest size; an inverse rings on as the held arm",
+        ),
+    ]
+    torque_time: Annotated[
+        float | None,
+        Quantity(
+            "time until it is small",
+            "s",
+            3,
+            help="1 % of its largest, by the least damped mode of the arm with its hub held; null where it never is",
+        ),
+    ]
     rise_time: Annotated[float, Quantity("rise time", "s", 4, help="of the profile")]
     added: Annotated[float, Quantity("time added by the shaper", "s", 4, help="until its last impulse")]
     impulses: Annotated[tuple[Impulse, ...], Quantity("impulses", help="of the shaper, all modes together")]
@@ -100,8 +139,18 @@ class ShapedReference:
             "N m",
             4,
             key="residual_moment_bound",
-            help="sum of the amplitudes of all modes of the model; null of a loop that is not linear or not stable",
+            help="above the size of the root moment at every sample after the slew; null where none is certified",
         ),
+    ]
+    certainty: Annotated[
+        str,
+        Quantity(
+            "certainty of the bound", help="frequency up to which it has every mode, or why there is none"
+        ),
+    ]
+    ranges: Annotated[
+        tuple[RangeBound, ...],
+        Quantity("bound over ranges of the arm", help="with controller and impulses of the nominal arm"),
     ]
     modes_used: Annotated[
         int, Quantity("modes of the model", help="flexible modes of the arm in the simulation")
@@ -137,7 +186,14 @@ class ShapedReference:
         return Table(columns=columns)
 
 
-def reference(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, error: float = 0.3) -> ShapedReference:
+def reference(
+    arm: Arm,
+    law: AnyLaw,
+    chain: Chain | None = None,
+    *,
+    error: float = 0.3,
+    ranges: Ranges | None = None,
+) -> ShapedReference:
     """Return impulses, modes and residual vibration of the slew of a chain, over frequency errors up to `error`.
 
     Parameters
@@ -146,14 +202,19 @@ def reference(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, error: float
         The loop; the chain has the slew and its reference, bang-bang without a shaper unless given.
     error
         Largest error of the frequencies, as a share.
+    ranges
+        Ends of numbers of the arm by key, over all of which the residual is bounded: {"payload.mass": (0.1, 0.11)}.
+        Controller, references and impulses stay those of `arm`.
 
     Raises
     ------
     ParameterError
-        As `simulate` does, for a loop whose simulation stops, and for an error outside (0, 0.9].
+        As `simulate` does, for a loop whose simulation stops, for an error outside (0, 0.9], and for a range of another
+        number than mass or inertia of payload, hub or attachment, friction or stiffness of the hub.
     """
     remedy = "the largest error of the frequencies is a share up to 0.9, such as 0.3"
     require(0 < number("error", error, remedy) <= 0.9, "error", error, remedy)
+    check_ranges(ranges or {})
     case = admit_case(kernel.CONSUMER, Case(arm, law, chain))
     chain = case.chain
     shaping = chain.reference
@@ -172,17 +233,27 @@ def reference(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, error: float
         for task in (late, plain)
     ]
     middle = errors.size // 2
+    torque_after = float(abs(late.feedforward[late.is_after]).max())
+    bound, certainty = certified_bound(case, late, {})
+    rows = []
+    if ranges:
+        rows.append(RangeBound(range_words(ranges), *certified_bound(case, late, ranges)))
     return ShapedReference(
         controller=controller(case.law, case.arm),
         profile=shaping.profile,
         shaper=shaping.shaper,
+        feedforward=shaping.feedforward,
+        torque_after=torque_after,
+        torque_time=time_until_small(case.arm, torque_after / max(abs(late.feedforward).max(), LEAST_SIZE)),
         rise_time=chain.slew.rise_time,
         added=added,
         impulses=tuple(Impulse(k * period, float(impulses[k])) for k in np.flatnonzero(impulses).tolist()),
         modes=tuple(shaped_mode(mode, z, impulses, case) for mode, z in poles.items()),
         residual=residuals[0][middle],
         unshaped=residuals[1][middle],
-        bound=residual_bound(case, late, used.modes),
+        bound=bound,
+        certainty=certainty,
+        ranges=tuple(rows),
         modes_used=used.modes,
         errors=errors,
         residuals=np.array(residuals[0]),
@@ -190,6 +261,18 @@ def reference(arm: Arm, law: AnyLaw, chain: Chain | None = None, *, error: float
         nominal=late,
         plain=plain,
     )
+
+
+def time_until_small(arm: Arm, share: float) -> float | None:
+    """Return the time [s] until a share is 1 % by the least damped mode of the held arm; None for never."""
+    if share <= 0.01:
+        return 0.0
+    held = modes(replace(arm, hub=replace(arm.hub, inertia=math.inf)), 10)
+    if arm.is_undamped:
+        return None
+    # the modes beyond the tenth are damped more
+    decay = -float(np.nanmax(damped_modes(held).eigenvalues.real))
+    return math.log(100 * share) / decay if decay > 0 else None
 
 
 def with_frequencies(arm: Arm, factor: float) -> Arm:
@@ -236,34 +319,11 @@ def shaped_mode(mode: int, z: complex, impulses: Real, case: Case) -> ShapedMode
     )
 
 
-def residual_bound(case: Case, task: Scenario, count: int) -> float | None:
-    """Return the bound on the residual root moment at the samples after a slew [N m]; None where there is none.
-
-    That is a loop that is not linear or not stable, one of an estimated hub rate, and eigenvectors that are nearly
-    parallel.
-    """
-    law = case.feedback
-    loop = loop_matrix(case, count)
-    is_covered = case.chain.is_linear and case.chain.converters.hub_rate == "ideal" and not law.wanted
-    if not is_covered:
-        return None
-    zero = np.zeros(task.t.size)
-    own = {name: task.references[name] for name in law.references}
-    references = np.array([own.get(name, zero) for name in loop.in_z.signals])
-    forcing = np.outer(loop.push, task.feedforward + loop.through @ references) - loop.read @ references
-    M = loop.under(1.0)
-    x = np.zeros(len(M))
-    end = int(task.is_after.argmax())
-    for k in range(end):
-        x = M @ x + forcing[:, k]
-    first = float(abs(loop.moment @ x - task.rigid_moment[end]))
-    x = M @ x + forcing[:, end]
-    # the state of rest under the constant references; that of an angle without feedback may be any
-    rest = np.linalg.lstsq(np.eye(len(M)) - M, forcing[:, -1], rcond=None)[0]
-    z, V = np.linalg.eig(M)
-    # 1e-9: rounding of a pole at 1
-    if abs(z).max() > 1 + 1e-9 or np.linalg.cond(V) > 1e12:
-        return None
-    amplitudes = (loop.moment @ V) * np.linalg.solve(V, (x - rest).astype(complex))
-    still = float(abs(loop.moment @ rest))
-    return max(first, still + float(abs(amplitudes).sum()))
+def certified_bound(case: Case, task: Scenario, ranges: Ranges) -> tuple[float | None, str]:
+    """Return the bound on the residual root moment over ranges of the arm [N m] and its certainty, in words."""
+    try:
+        found, number = SlewBounds(case, task).over(ranges)
+    except CertificationError as error:
+        return None, f"not certified: {error}"
+    words = f"certified up to {found.band.top:.3g} rad/s, not determined beyond"
+    return found.most, f"{words}; {number} boxes" if ranges else words

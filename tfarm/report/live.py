@@ -18,8 +18,8 @@ from tfarm.errors import TfarmError, require
 from tfarm.exported.live_loop import CONSUMER, LIVE_COLUMNS
 from tfarm.loop.panels import PANEL_SAMPLES
 from tfarm.plots.style import GOOD, LOW, MARGINAL, POOR, STABLE, UNSTABLE
-from tfarm.report.blocks import TEMPLATES, argument, render, write_text
-from tfarm.report.page import ArmReport, GivenLaw, has_loop, is_preset, sign_words
+from tfarm.report.blocks import TEMPLATES, render, write_text
+from tfarm.report.page import ArmReport, GivenLaw, has_loop, sign_words
 
 LIVE_PAGE = "live.html"
 ASSETS = "assets"
@@ -59,7 +59,7 @@ def save_live(report: ArmReport, folder: Path) -> None:
     except TfarmError as error:
         write_text(out, render("live_failed.html", title=title, why=str(error)))
         return
-    data = {"name": arm.name, "command_name": argument(arm.name, is_preset(arm, report.chain)), **numbers}
+    data = {"name": arm.name, "command_name": report.command_name, **numbers}
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
     colours = {
         "stable": STABLE,

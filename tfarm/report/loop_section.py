@@ -9,7 +9,7 @@ from tfarm.arm import MOMENT_GAIN, PLANE, RATE_GAIN, unit_of, warn_of_cancellati
 from tfarm.arm.blocks import Rational
 from tfarm.arm.law import REFERENCE, is_measured
 from tfarm.arrays import Real
-from tfarm.digits import plain, significant
+from tfarm.digits import plain
 from tfarm.dsp.discretise import rule_in_words
 from tfarm.errors import ConvergenceError, TfarmError
 from tfarm.loop.loci import Loci, round_branches
@@ -32,6 +32,7 @@ from tfarm.report.overview import results
 from tfarm.report.page import ArmReport, PageCase, has_loop, sign_words
 from tfarm.response.signals import Signals, sign_convention
 from tfarm.schema import Column, Quantity, Table, across, curve_table, quantities, roots_table, table, text
+from tfarm.synthesis.structures import TYPED_DIGITS
 
 # ------------------------------------------------------------ margins
 
@@ -93,15 +94,16 @@ def nyquist_section(report: ArmReport) -> PageSection:
     """Return the loop function of each controller on a contour that hides nothing, its encirclements counted."""
     blocks: list[Picture | Table] = []
     counts: dict[str, Nyquist] = {}
-    for each in report.in_s:
+    shown = report.in_s
+    for each in shown:
         counts[each.title] = found = each.nyquist
-        # of the recommended gains the Bode plot has the numbers, and large arcs are those of the same signals
-        is_own = each.key != "recommended"
+        # next to recommended gains, the default ones have the numbers of their Bode plot, and large arcs alike
+        is_full = bool(report.laws) or each is shown[-1]
         linear = loop_function.nyquist.figure(found, name=each.name)
-        data = curve_table(found) if is_own else ()
+        data = curve_table(found) if is_full else ()
         stem = each.stem("nyquist")
         blocks.append(picture_block("nyquist_plot", linear, stem=stem, data=data, each=each, found=found))
-        if is_own:
+        if is_full:
             disc = loop_function.disc.figure(found, name=each.name)
             blocks.append(picture_block("nyquist_disc", disc, stem=f"{stem}-disc", each=each, found=found))
     own = any(found.unstable_open for found in counts.values())
@@ -209,16 +211,18 @@ def continuous_interval_facts(report: ArmReport) -> list[Fact]:
 
 
 def recommended_section(report: ArmReport) -> PageSection:
-    """Return the fastest gains of the map that meet the requirements of the grade good, with their result card.
+    """Return the design by default: gains that meet the requirements of the grade good, with their result card.
 
-    Where none meet them all, those nearest to it with the requirements that they do not meet.
+    Where none meet them all, those nearest to it with the requirements that they do not meet, and what would help.
     """
     title = "Recommended gains"
     found = report.recommended
     if found is None:
-        return PageSection(title=title, answer=prose("no_stable_gains"))
-    gains = ", ".join(found.law.gain_text(name, partial(significant, digits=4), report.arm) for name in PLANE)
-    answer = prose("recommended", found=found, gains=gains)
+        return PageSection(title=title, answer=prose("no_stable_gains", why=report.why_none))
+    gains = ", ".join(
+        found.law.gain_text(name, partial(plain, digits=TYPED_DIGITS), report.arm) for name in PLANE
+    )
+    answer = prose("recommended", found=found, gains=gains, command=report.command_name)
     card: list[dict[str, Any]] = []
     if found.is_met:
         each = report.in_s[-1]

@@ -11,8 +11,8 @@ from tfarm.assessment.card import ResultCard
 from tfarm.errors import TfarmError
 from tfarm.plots.files import save_figure
 from tfarm.plots.frequency import draw_card
-from tfarm.report.blocks import PICTURES, PageSection, SavedBlock, argument, keep, prose
-from tfarm.report.page import ArmReport, PageCase, is_preset
+from tfarm.report.blocks import PICTURES, PageSection, SavedBlock, keep, prose
+from tfarm.report.page import ArmReport, PageCase
 from tfarm.schema import table, text, to_dict
 
 # a line
@@ -78,10 +78,9 @@ def summary(report: ArmReport) -> str:
 def limits_in_words(report: ArmReport, each: PageCase) -> list[str]:
     """Return the limiting mode of a case, the costs of sampling and the next step, a sentence or two each."""
     name = each.own_name if len(report.cases) > 1 else ""
-    command = argument(report.arm.name, is_preset(report.arm, report.chain))
     found = report.limits(each)
     parts = ("limits_mode", "limits_sampling", "limits_next")
-    words = [prose(part, found=found, name=name, command=command) for part in parts]
+    words = [prose(part, found=found, name=name, command=report.command_name) for part in parts]
     return [sentence for sentence in words if sentence]
 
 

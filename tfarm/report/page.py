@@ -63,16 +63,17 @@ from tfarm.studies.candidates import (
     section_study,
     tuner_numbers,
 )
-from tfarm.synthesis.good_region import RequiredGains
+from tfarm.synthesis.design import recommended_gains
 from tfarm.synthesis.limits import LoopLimits, loop_limits
+from tfarm.synthesis.result import Design
 from tfarm.synthesis.stability_map import (
     DESIGNED_MODES,
     StabilityMap,
     StableRegions,
-    recommended_gains,
     stability_map,
     stable_regions,
 )
+from tfarm.synthesis.structures import TYPED_DIGITS
 
 # at most: a second of computing
 FILM_FRAMES = 80
@@ -118,7 +119,7 @@ class PageCase(OfCase):
         """The name of the controller itself, or its gains with their values."""
         if self.case.gains is None:
             return one_line(self.law.name, 60)
-        return gains_words(self.law)
+        return gains_words(self.law, TYPED_DIGITS)
 
     @property
     def gains(self) -> str:
@@ -126,7 +127,7 @@ class PageCase(OfCase):
         law = self.law
         if self.case.gains is None:
             return f"order {law.order}, of {', '.join(law.signals)}"
-        return gains_words(law)
+        return gains_words(law, TYPED_DIGITS)
 
     @property
     def title(self) -> str:
@@ -314,7 +315,9 @@ class ArmReport(NamedTuple):
     @property
     def bare(self) -> PageCase:
         """The default gains without that of the root moment."""
-        return self.case_of(GivenLaw(self.gains.having(MOMENT_GAIN, 0.0)), f"{MOMENT_GAIN} = 0", "without")
+        return self.case_of(
+            GivenLaw(self.gains.with_number(MOMENT_GAIN, 0.0)), f"{MOMENT_GAIN} = 0", "without"
+        )
 
     @property
     def has_loop(self) -> bool:
@@ -322,9 +325,19 @@ class ArmReport(NamedTuple):
         return not self.arm.is_locked if self.laws else has_loop(self.arm)
 
     @property
-    def recommended(self) -> RequiredGains | None:
-        """The fastest gains of the grade good, else those nearest to it; None where no gains are stable."""
-        return recommended_gains(self.arm, self.chain) if has_loop(self.arm) else None
+    def recommended(self) -> Design | None:
+        """The gains that `tfarm design` returns by default; None where there are none, with `why_none`."""
+        return recommended_gains(self.arm, self.chain)[0] if has_loop(self.arm) else None
+
+    @property
+    def command_name(self) -> str:
+        """The arm in a command."""
+        return argument(self.arm.name, is_preset(self.arm, self.chain))
+
+    @property
+    def why_none(self) -> str:
+        """The reason why no gains are recommended."""
+        return recommended_gains(self.arm, self.chain)[1]
 
     def limits(self, each: PageCase) -> LoopLimits:
         """Return the limits of a case; of the page's own gains with those recommended in their place."""

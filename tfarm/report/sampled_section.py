@@ -135,7 +135,7 @@ def loci_picture(report: ArmReport, found: Analysis) -> Picture:
     rows = []
     for name, locus in loci.by.items():
         for value, poles in zip(locus.values.tolist(), locus.z, strict=True):
-            own = locus.loop.having(locus.gain, value)
+            own = locus.loop.with_number(locus.gain, value)
             gains = [own.number(each) for each in PLANE]
             upper = [(mode, z) for mode, z in zip(locus.mode.tolist(), poles, strict=True) if not z.imag < 0]
             rows += [(name, *gains, mode, z.real, z.imag) for mode, z in upper]

@@ -212,16 +212,16 @@ def make_all(tasks: Calls, progress: Progress | None) -> dict[str, Sequence[Any]
     longest = sorted(tasks, key=lambda task: not task.endswith(tuple(Task)))
     done: dict[str, Sequence[Any]] = {}
 
-    def begun(running: Sequence[str]) -> None:
+    def on_start(running: Sequence[str]) -> None:
         if progress is not None:
             progress(len(done), len(tasks), ", ".join(running))
 
     # a second process takes a second or two to start
     count = MOST_WORKERS if len(tasks) >= 8 else 1
     calls = ((task, partial(_results, tasks[task])) for task in longest)
-    for task, results in share_tasks(calls, count, begun, joins=True):
-        done[task] = results  # noqa: PERF403  `begun` counts them meanwhile
-    begun(["pages"])
+    for task, results in share_tasks(calls, count, on_start, joins=True):
+        done[task] = results  # noqa: PERF403  `on_start` counts them meanwhile
+    on_start(["pages"])
     return done
 
 

@@ -58,7 +58,7 @@ class Signals:
         """The exact system of the arm."""
         return system_of(self.arm)
 
-    def kept(self, s: Complex) -> LoopParts:
+    def recall_parts(self, s: Complex) -> LoopParts:
         """Return `parts`, cached for the last 24 sets of points."""
         key = (s.shape, s.tobytes())
         cache = self._cache

@@ -76,7 +76,7 @@ def zeros_of(arm: Arm, wanted: Output, up_to: float, x: float) -> Roots:
     at_zero = max(0, order + wanted.power - k.at_rest)
     neighbours = {("theta", "root"): math.inf, ("M", "root"): 0.0 if arm.is_uniform else None}
     neighbour = neighbours.get((wanted.quantity, wanted.place))
-    other = arm if neighbour is None else arm.having(hub_inertia=neighbour)
+    other = arm if neighbour is None else arm.with_numbers(hub_inertia=neighbour)
     if neighbour is not None and arm.is_undamped:
         return _on_axis(flexible_frequencies(other, up_to), at_zero, up_to)
 

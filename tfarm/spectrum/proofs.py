@@ -23,7 +23,7 @@ argument is the principal argument of end over start.  The sum over the half con
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -149,6 +149,18 @@ def proven_count(k: System, box: Box, law: Feedback | None = None, *, most_piece
     """
     if k.damping and box.re_min <= -1.0 / k.damping:
         raise CertificationError(f"a box from {box.re_min:g} 1/s on contains the accumulation point -1/C")
+    turned = edge_change(lambda s: characteristic_over(k, s, law), box, most_pieces)
+    number = (turned / flint.arb.pi()).unique_fmpz()
+    if number is None:
+        raise CertificationError("the change of arg D around the box is no certain multiple of pi")
+    return int(number)
+
+
+def edge_change(value_over: Callable[[Ball], Ball], box: Box, most_pieces: int = 6000) -> Ball:
+    """Return the change of the argument along the upper half of the edge of a box, where a function is off zero.
+
+    `value_over` encloses it over a ball.  Raises CertificationError as `proven_count` does.
+    """
     right = box.re_max
     left = box.re_min
     top = box.im_max
@@ -157,26 +169,23 @@ def proven_count(k: System, box: Box, law: Feedback | None = None, *, most_piece
     with precision(96):
         turned = flint.arb(0)
         for a, b in pairwise(corners):
-            turned += _argument_change(k, law, point(a), point(b), most_pieces)
-        number = (turned / flint.arb.pi()).unique_fmpz()
-    if number is None:
-        raise CertificationError("the change of arg D around the box is no certain multiple of pi")
-    return int(number)
+            turned += _argument_change(value_over, point(a), point(b), most_pieces)
+    return turned
 
 
-def _argument_change(k: System, law: Feedback | None, a: Ball, b: Ball, most_pieces: int) -> Ball:
-    """Return the change of arg D along the side from a to b."""
+def _argument_change(value_over: Callable[[Ball], Ball], a: Ball, b: Ball, most_pieces: int) -> Ball:
+    """Return the change of the argument along the side from a to b."""
     # 1 / 32 of a side of the contour, before adaptation: time alone
     total = flint.arb(0)
     start = 0.0
     step = 1 / 32
     pieces = 0
     here = a
-    value = characteristic_over(k, a, law)
+    value = value_over(a)
     while start < 1:
         end = min(start + step, 1.0)
         there = (a + (b - a) * end).mid()
-        over = characteristic_over(k, here.union(there), law)
+        over = value_over(here.union(there))
         pieces += 1
         if pieces > most_pieces:
             raise CertificationError(
@@ -188,7 +197,7 @@ def _argument_change(k: System, law: Feedback | None, a: Ball, b: Ball, most_pie
             if step < 2.0 ** (-26):
                 raise CertificationError(f"a zero lies on the edge of the box, near {complex(here):.6g}")
             continue
-        end_value = characteristic_over(k, there, law)
+        end_value = value_over(there)
         total += (end_value / value).log().imag
         start = end
         here = there

@@ -315,7 +315,7 @@ def hub_locked(table: Modes) -> Modes:
     """
     if table.arm.is_locked:
         return table
-    return modes(table.arm.having(hub_inertia=math.inf), int(table.index.max()), theory=table.theory)
+    return modes(table.arm.with_numbers(hub_inertia=math.inf), int(table.index.max()), theory=table.theory)
 
 
 def modes_below(arm: Arm, up_to: float, *, theory: Theory | None = None) -> int:

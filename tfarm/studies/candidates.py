@@ -230,10 +230,11 @@ def hub_study(arm: Arm, count: int = 4) -> Candidates:
     inertias = _with_own([inertia * 10.0**decades for inertia in usual], own)
     rows = _candidates(arm, count, "hub.inertia", inertias.index(own), {"hub_inertia": inertias})
     pinned, locked = (
-        modes(arm.having(hub_inertia=limit), count).natural_frequency[-count:] for limit in (0.0, math.inf)
+        modes(arm.with_numbers(hub_inertia=limit), count).natural_frequency[-count:]
+        for limit in (0.0, math.inf)
     )
     # the first falls to 0, a heavy hub on the arm's own stiffness
-    if not arm.having(hub_inertia=1.0).has_rigid_mode:
+    if not arm.with_numbers(hub_inertia=1.0).has_rigid_mode:
         locked = np.r_[0.0, locked[:-1]]
     return Candidates(
         arm, "all else held", locked, pinned, arm.link.section.area, arm.link.shear_factor, rows

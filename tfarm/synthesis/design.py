@@ -8,36 +8,44 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from itertools import islice
 from operator import attrgetter, itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from tfarm.arm import TWO_GAINS, AnyLaw, Arm, must_turn
+from tfarm.arm import TWO_GAINS, AnyLaw, Arm, Law, must_turn
 from tfarm.arm.stages import Consumer
+from tfarm.arm.weights import USUAL_WEIGHTS, Weights, weights_of
 from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import arm_under_chain
+from tfarm.dsp.profiles import motion_of_slew
+from tfarm.dsp.simulate import quantisers
 from tfarm.dsp.stages import admit
-from tfarm.errors import ConvergenceError, ParameterError
+from tfarm.errors import ConvergenceError, ParameterError, TfarmError
 from tfarm.errors import require as require_that
 from tfarm.loop.continuous import ContinuousLoop
+from tfarm.loop.norms import weight_sizes
 from tfarm.loop.sampled_brief import sampled_brief
 from tfarm.loop.stability import stability
 from tfarm.records import frozen
-from tfarm.synthesis.drawn import AnyStudy, drawn_arms, verify, violation_on
+from tfarm.synthesis.drawn import AnyStudy, drawn_arms, verify
+from tfarm.synthesis.goals import norm_bound
+from tfarm.synthesis.good_region import map_region
 from tfarm.synthesis.judge import LOST, OBJECTIVES, TOO_SLOW, Judge, judge_of, model_sizes
-from tfarm.synthesis.required import (
-    RequiredLaw,
-    RequirementTask,
-    why_none,
+from tfarm.synthesis.required import RequiredLaw, RequirementTask, why_none
+from tfarm.synthesis.requirements import (
+    MEASURES,
+    NAMES,
+    NORM,
+    RequirementList,
+    measure_named,
+    requirements_of,
 )
-from tfarm.synthesis.requirements import MEASURES, RequirementList, measure_named, requirements_of
 from tfarm.synthesis.result import Design, OnArm
 from tfarm.synthesis.search import Search, Worst, flat_part, search
-from tfarm.synthesis.stability_map import recommended_gains
 from tfarm.synthesis.structures import STRUCTURES, Bounds, Structure, check_bounds, structure_of
 from tfarm.synthesis.trade_off import TradeOff, front
 from tfarm.synthesis.worst_case import (
@@ -105,6 +113,7 @@ def design(
     study: AnyStudy | None = None,
     posterior: str | os.PathLike[str] | None = None,
     fresh: int = 64,
+    weights: Mapping[str, Any] | Weights | None = None,
 ) -> Design:
     """Return the law of a structure with the best value of an objective in the sampled loop of a chain (default 10 ms).
 
@@ -133,6 +142,9 @@ def design(
     `study` is the file of a study, or its table of distributions, `posterior` that of a fit: requirements are met on
     the worst arms of a pool drawn from them, and `fresh` further arms examine the law, `.verification`.
 
+    `weights` of S, KS and T are those of `tfarm.norm`, by default 1 of S and T: "norm" is the H-infinity norm of all
+    weighted functions as a column, on the exact loop its certified upper bound.
+
     Raises ParameterError for options that exclude each other, ConvergenceError where no
     stable law is found.
     """
@@ -144,7 +156,7 @@ def design(
     ends = {key: (float(low), float(high)) for key, (low, high) in (ranges or {}).items()}
     box = ArmBox(arm, ends) if ends else None
     options = _Options(
-        arm, structure, {"K1": K1, "K2": K2}, Kp, modes, chain or Chain(), tuple(also), box, progress
+        arm, structure, {"K1": K1, "K2": K2}, Kp, modes, chain or Chain(), tuple(also), box, progress, weights
     )
     is_of_drawn = study is not None or posterior is not None
     remedy = "requirements hold on arms of a study or posterior: name --minimise by one of their quantities"
@@ -156,23 +168,25 @@ def design(
             must_turn(arm)
         arms, form = options.arms_and_form(is_angle_free=False)
         task = _DesignTask(arm, str(objective), form, modes, options.chain, continuous, options.tell)
-        return task.design(*for_the_worst(arms, box, task.find, task.score_on, options.tell))
+        return options.with_norm(
+            task.design(*for_the_worst(arms, box, task.find, task.score_on, options.tell))
+        )
     search_for, arms = options.task(objective, require)
     drawn = None
     worst = search_for.score_on
     if is_of_drawn:
         require_that(box is None, "range", ranges, "a study or posterior has its own ranges: leave these out")
         drawn = drawn_arms(arm, study, posterior, fresh)
-        worst = partial(violation_on, search_for)
+        worst = search_for.violation_on
     found, named, case = for_the_worst(
-        arms, box or drawn, partial(_find_or_good_gains, search_for), worst, options.tell
+        arms, box or drawn, partial(_find_near_map, search_for), worst, options.tell
     )
     conflicts: tuple[str, ...] = ()
     alternatives: tuple[str, ...] = ()
     if found.violation > 0:
         conflicts = search_for.conflicts(found, named)
         alternatives = _alternatives(options, search_for, named)
-    return replace(
+    record = replace(
         _record(search_for, found, named, case, is_continuous=False),
         requirements=found.checked,
         sensitivities=tuple(search_for.sensitivities(found)),
@@ -180,36 +194,53 @@ def design(
         conflicts=conflicts,
         alternatives=alternatives,
     )
+    return replace(options, weights=search_for.weights).with_norm(record)
 
 
-def _find_or_good_gains(
+def _find_near_map(
     task: RequirementTask, named: Sequence[NamedArm], before: RequiredLaw | None, effort: Effort
 ) -> RequiredLaw:
-    """Return the law of a search, or of the region of good gains in the map, where that has less violation.
+    """Return the law of a search that begins at the region of the requirements in the map of both gains.
 
-    That region may be a sliver, between whose points a search finds none.
+    That region may be a sliver, between whose points a search finds none.  The fastest gains of its grid are near the
+    best: of one arm a short search follows.
     """
+    form = task.form
+    is_free = form.name == TWO_GAINS and not form.given and not any(form.fixed.values())
+    region = None
+    if is_free and before is None and effort == "whole":
+        region = map_region(named[0].arm, task.chain, task.requirements)
+    if region is None:
+        return task.find(named, before, effort)
+    law = region.start
+    x = np.clip(form.at([*law.point]), *form.box)
+    search_at = Search(form, [], 1, 1, ())
+    start = RequiredLaw(Worst(()), search_at, np.inf, x, law, task.goal, ())
+    is_of_speed = task.minimised in ("settling_time_s", "time_constant_s")
+    is_near = is_of_speed and region.met.any() and len(named) == 1
     found: RequiredLaw | None = None
     failure = ConvergenceError("", None, None)
     try:
-        found = task.find(named, before, effort)
+        found = task.find(named, start, "near" if is_near else effort)
     except ConvergenceError as error:
         failure = error
-    form = task.form
-    has_map = (
-        form.name == TWO_GAINS and not form.given and not any(form.fixed.values()) and effort != "sketch"
-    )
-    if has_map and (found is None or found.violation > 0):
-        gains = recommended_gains(named[0].arm, task.chain)
-        if gains is not None:
-            x = np.clip(form.at([*gains.law.point]), *form.box)
-            judges = tuple(task.judge(each.arm, task.goal, 0) for each in named)
-            chosen = task.examine(named, judges, Search(form, [(0.0, x)], 1, 1, ()), x, task.goal)
-            if chosen.violation < (np.inf if found is None else found.violation):
-                found = chosen
+    if found is None or found.violation > 0:
+        judges = tuple(task.judge(each.arm, task.goal, 0) for each in named)
+        chosen = task.examine(named, judges, search_at, x, task.goal)
+        if chosen.violation < (np.inf if found is None else found.violation):
+            found = chosen
     if found is None:
         raise failure
     return found
+
+
+@lru_cache(maxsize=8)
+def recommended_gains(arm: Arm, chain: Chain) -> tuple[Design | None, str]:
+    """Return the design by default of an arm, and the reason where there is none."""
+    try:
+        return design(arm, chain=chain), ""
+    except TfarmError as error:
+        return None, str(error)
 
 
 def trade_off(
@@ -226,6 +257,7 @@ def trade_off(
     progress: Tell | None = None,
     also: Sequence[Arm] = (),
     number: int = 12,
+    weights: Mapping[str, Any] | Weights | None = None,
 ) -> TradeOff:
     """Return the front of speed against robustness: designs from 0.4 to 1.9 times the limits of the grade good.
 
@@ -233,8 +265,9 @@ def trade_off(
     Requirements of other quantities than gain, phase and delay margin and Ms hold at every one of the `number` designs.
     Raises ParameterError as `design` does, ConvergenceError where no law is stable on all arms.
     """
+    bounds = {"K1": K1, "K2": K2}
     options = _Options(
-        arm, structure, {"K1": K1, "K2": K2}, Kp, modes, chain or Chain(), tuple(also), None, progress
+        arm, structure, bounds, Kp, modes, chain or Chain(), tuple(also), None, progress, weights
     )
     return front(*options.task(objective or "time-constant", require), number)
 
@@ -252,6 +285,7 @@ class _Options:
     also: tuple[Arm, ...]
     box: ArmBox | None
     progress: Tell | None
+    weights: Mapping[str, Any] | Weights | None
 
     def tell(self, text: str) -> None:
         """Pass a line of progress on."""
@@ -261,7 +295,7 @@ class _Options:
     def form(self, structure: str, *, is_angle_free: bool) -> Structure:
         """Return a structure with what is given of it, if it is the one named."""
         is_own = structure == self.structure
-        return structure_of(
+        found = structure_of(
             structure,
             self.arm,
             Kp=self.Kp if is_own else 0.0,
@@ -269,6 +303,16 @@ class _Options:
             period=self.chain.sampling.period,
             bounds=self.bounds if is_own else {},
             is_angle_free=is_angle_free,
+        )
+        *_, highest = quantisers(self.chain)[-1]
+        return replace(found, is_limited=bool(np.isfinite(highest)))
+
+    def with_norm(self, found: Design) -> Design:
+        """Return a design with the norm of its law, where there are weights."""
+        if self.weights is None:
+            return found
+        return replace(
+            found, norm=norm_bound(Case(self.arm, found.law, self.chain), weights_of(self.weights))
         )
 
     def arms_and_form(self, *, is_angle_free: bool) -> tuple[list[NamedArm], Structure]:
@@ -290,14 +334,29 @@ class _Options:
         if objective is None:
             # an arm that cannot turn has no slew
             objective = "settling" if self.arm.has_rigid_mode else "time-constant"
+        remedy = (
+            "goes without requirements: leave them out, or minimise settling, time-constant, torque or Ms"
+        )
+        require_that(objective not in OBJECTIVES or objective in NAMES, "objective", objective, remedy)
         minimised = measure_named(objective, "objective")
         remedy = "is large in a good loop: require it, and minimise settling, time-constant, torque or Ms"
         require_that(MEASURES[minimised].sense == "<=", "objective", objective, remedy)
         limits = requirements_of("good" if wanted is None else wanted)
         if MEASURES[minimised].of_slew or any(each.measure.of_slew for each in limits):
             must_turn(self.arm)
+            # a file of a profile is read here, before any search
+            motion_of_slew(self.chain, self.arm.reach, np.arange(2.0))
         arms, form = self.arms_and_form(is_angle_free=True)
-        return RequirementTask(self.arm, limits, minimised, form, self.modes, self.chain, self.tell), arms
+        names = {minimised, *(each.name for each in limits)}
+        if "peak_input" in names:
+            form = replace(form, is_limited=True)
+        weights = None
+        if NORM in names or self.weights is not None:
+            weights = weights_of(USUAL_WEIGHTS if self.weights is None else self.weights)
+            # those of another period are refused before any work
+            weight_sizes(weights, np.ones(1), self.chain.sampling.period)
+        task = RequirementTask(self.arm, limits, minimised, form, self.modes, self.chain, self.tell, weights)
+        return task, arms
 
 
 def _other_forms(options: _Options) -> Iterator[Structure]:
@@ -419,11 +478,14 @@ def _record(
         on_arms.append(OnArm(name, numbers, value, stability(on_arm), sampled_brief(on_arm)))
     at_ends = own.at_ends(x)
     physical = own.ends(physical=True)
+    coefficients = own.by_name(own.coefficients(x).tolist())
+    if isinstance(law, Law) and law.anti_windup:
+        coefficients["anti_windup_s"] = law.anti_windup
     return Design(
         objective=task.objective,
         structure=own.name,
         law=law,
-        coefficients=own.by_name(own.coefficients(x).tolist()),
+        coefficients=coefficients,
         value=objective.worst([each.value for each in on_arms]),
         verdict=on_arms[0].verdict,
         bounds={each.name: each.bounds for each in own.free},

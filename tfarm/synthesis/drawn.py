@@ -30,8 +30,6 @@ from tfarm.records import frozen
 from tfarm.schema import Percent, Quantity
 from tfarm.spectrum.gains import default_gains
 from tfarm.synthesis.goals import Checked, check
-from tfarm.synthesis.judge import Judge
-from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.required import RequiredLaw, RequirementTask
 from tfarm.synthesis.worst_case import DrawnArms, NamedArm, Tell
 
@@ -162,36 +160,6 @@ def _space_of(declared: Mapping[str, Any]) -> Space:
         posterior=load_posterior(posterior) if posterior else None,
         listing=listing_of(Path(rows)) if rows else None,
     )
-
-
-def violation_on(task: RequirementTask, choice: RequiredLaw, on: Arm) -> float:
-    """Return the largest violation of a requirement on an arm, 0 where all are met; inf of an unstable loop.
-
-    By the exact loops where the models are near a limit; after a sketch, which has not examined the law, by the models.
-    """
-    # of a limit: an arm with more left by the models has some left by the exact loops
-    near = 0.01
-    judge = task.judge(on, choice.goal, 0)
-    by_models = violation_by_models(judge, choice)
-    if by_models < -near or not choice.checked:
-        return max(0.0, by_models)
-    rows, _ = check(choice.goal, task.arm, task.chain, NamedArm(on.name, on, {}), choice.law)
-    return max(0.0, *(each.violation for each in rows))
-
-
-def violation_by_models(judge: Judge, choice: RequiredLaw) -> float:
-    """Return the largest violation on the models of both loops, negative where all are met; 0 where a slew decides."""
-    entries = judge.entries(choice.law)
-    wanted = choice.goal.requirements
-    found = [0.0] if any(each.measure.of_slew for each in wanted) else []
-    for model in (judge.model, *judge.also[:1]):
-        loop = LoopMeasures(model, entries, model.poles(entries), judge.chain.sampling.period)
-        if model.growth(loop.poles).max() >= 0:
-            return np.inf
-        found += [
-            float(each.violations(loop.of(each.name))[0]) for each in wanted if not each.measure.of_slew
-        ]
-    return max(found)
 
 
 def verify(task: RequirementTask, choice: RequiredLaw, drawn: DrawnArms, tell: Tell) -> Verification:

@@ -19,25 +19,34 @@ import numpy as np
 from scipy.optimize import minimize
 
 from tfarm.arm import AnyLaw, Arm
+from tfarm.arm.weights import Weights
 from tfarm.arrays import LEAST_SIZE, Real
-from tfarm.assessment.card import LoopCard, loop_card
+from tfarm.assessment.card import LoopCard, analysis_of, graded_arm, loop_card
+from tfarm.assessment.signal_figures import PARTS
 from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import arm_under_chain
+from tfarm.dsp.stages import admit_case
 from tfarm.errors import ConvergenceError
+from tfarm.loop.loop_margins import bandwidth
+from tfarm.loop.norms import NormBound, norm
+from tfarm.loop.sampled_verdict import SAMPLED_LOOP
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.gains import turning_inertia
 from tfarm.spectrum.table import first_frequency
-from tfarm.synthesis.judge import LOST, slowest_allowed
+from tfarm.synthesis.judge import LOST, lost, of_laws, slowest_allowed
 from tfarm.synthesis.measures import LoopMeasures
-from tfarm.synthesis.requirements import Requirement
+from tfarm.synthesis.models import DesignModel
+from tfarm.synthesis.requirements import NORM, Requirement
 from tfarm.synthesis.slew_measures import SlewMeasures
 from tfarm.synthesis.structures import Entry
 from tfarm.synthesis.worst_case import NamedArm
 
 # ln |z| of a loop with the delay of its requirement, which counts as a violation of 1
 GROWTH_OF_DELAY = 0.05
+# requirements on poles, the others on the loop function
+OF_POLES = ("least_damping", "time_constant_s", NORM)
 # of the scores, times a violation
 WEIGHT = 30.0
 # of the time constant, in the score of a settling time: it decides where the tip is at rest when the motion ends
@@ -50,6 +59,7 @@ class Goal:
 
     `shifts` tighten each requirement of the sampled (0) and of the continuous-time loop (1) on the model; `delays` are
     further delays [periods] with which the sampled loop has to be stable.  A violation counts by the `weight`.
+    `weights` are those of a norm.
     """
 
     requirements: tuple[Requirement, ...]
@@ -57,6 +67,7 @@ class Goal:
     shifts: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     delays: tuple[float, ...] = ()
     weight: float = WEIGHT
+    weights: Weights | None = None
 
     is_negated = False
     of_slew = False
@@ -79,72 +90,101 @@ class Goal:
         shifts = self.shifts[loop] or (0.0,) * len(self.requirements)
         return zip(self.requirements, shifts, strict=True)
 
-    def scores(self, judge: Any, entries: Sequence[Entry], poles: Any) -> Real:
-        """Return the scores of laws that are stable on the model (laws,)."""
-        sampled = LoopMeasures(judge.model, entries, poles, judge.chain.sampling.period)
+    def aims(self, judge: Any, entries: Sequence[Entry], limits: Real) -> Real:
+        """Return the scores of laws (laws,), `LOST` and more where the model is unstable; any value above their limits.
+
+        Margins of the sampled loop are first: most laws are above their limit by these, whatever their speed.
+        """
+        scores = slowness(judge, entries) + self._least(judge)
+        for stage in (self._margins, self._speeds, self._continuous, self._delays):
+            left = np.flatnonzero(scores <= limits)
+            if left.size:
+                scores[left] += stage(judge, of_laws(entries, left))
+        return scores
+
+    def _least(self, judge: Any) -> float:
+        """Return a lower bound of the logarithm of the value."""
+        if _is_of_slew(self.minimised) or self.minimised == "time_constant_s":
+            # half the time constant of a pole at twice the first frequency
+            return float(np.log(0.25 / first_frequency(judge.arm)))
+        return float(np.log(LEAST_SIZE))
+
+    def _margins(self, judge: Any, entries: Sequence[Entry]) -> Real:
+        """Return the penalties of requirements on the loop function (laws,)."""
+        return self._penalty(self.loop_violations(0, measures_of(judge, entries), (False,)))
+
+    def _speeds(self, judge: Any, entries: Sequence[Entry]) -> Real:
+        """Return the logarithm of the value above its bound, with the penalties of requirements on poles (laws,)."""
+        loop = measures_of(judge, entries)
+        growth = loop.growth
+        scores = np.log(self.value(judge, loop)) - self._least(judge)
+        scores += self._penalty(self.loop_violations(0, loop, (True,)))
+        return np.where(growth < 0, scores, lost(1, growth))
+
+    def _continuous(self, judge: Any, entries: Sequence[Entry]) -> Real:
+        """Return the penalties of the continuous-time loop (laws,)."""
+        return self._penalty(self.loop_violations(1, measures_of(judge, entries, judge.also[0])))
+
+    def _delays(self, judge: Any, entries: Sequence[Entry]) -> Real:
+        """Return the penalties of unstable loops with the delays required (laws,)."""
+        return self._penalty(self._delay_violations(judge, entries))
+
+    def value(self, judge: Any, sampled: LoopMeasures) -> Real:
+        """Return the quantity that is minimised, in place of one of the slew the dominant time constant (laws,)."""
         if _is_of_slew(self.minimised):
-            value = sampled.dominant_time_constant(first_frequency(judge.arm))
-        else:
-            value = sampled.of(self.minimised)
-        return (
-            np.log(np.maximum(value, LEAST_SIZE)) + slowness(judge, entries) + self._penalty(judge, sampled)
-        )
+            return sampled.dominant_time_constant(first_frequency(judge.arm))
+        return np.maximum(sampled.of(self.minimised), LEAST_SIZE)
+
+    def _penalty(self, violations: Iterable[Real]) -> Real:
+        """Return the weighted sum of violations (laws,)."""
+        return np.asarray(self.weight * sum(np.maximum(each, 0.0) for each in violations))
+
+    def loop_violations(
+        self, number: int, loop: LoopMeasures, of_poles: tuple[bool, ...] = (False, True)
+    ) -> list[Real]:
+        """Return the violations (laws,) of each requirement of the sampled (0) or the continuous-time loop (1)."""
+        found = []
+        for each, shift in self.shifted(number):
+            if each.measure.is_of(number) and (each.name in OF_POLES) in of_poles:
+                found.append(each.violations(loop.of(each.name)) + shift)
+        return found
+
+    def _delay_violations(self, judge: Any, entries: Sequence[Entry]) -> list[Real]:
+        """Return the growth (laws,) with the delays: the loop function leaves out that signals are read late."""
+        growth = [measures_of(judge, entries, model).growth for model in judge.delayed]
+        return [np.max(growth, axis=0) / GROWTH_OF_DELAY] if growth else []
 
     def violations(self, judge: Any, sampled: LoopMeasures) -> list[Real]:
         """Return the violations (laws,) of each requirement of the loops, those of the sampled one first."""
-        found = []
-        loops = [sampled]
-        if judge.also:
-            other = judge.also[0]
-            needs_poles = any(each.name in ("time_constant_s", "least_damping") for each in self.requirements)
-            poles = other.poles(sampled.entries) if needs_poles else sampled.poles
-            loops.append(LoopMeasures(other, sampled.entries, poles, sampled.period))
-        for number, loop in enumerate(loops):
-            for each, shift in self.shifted(number):
-                if each.measure.of_slew:
-                    continue
-                violation = each.violations(loop.of(each.name)) + shift
-                if each.name == "delay_margin_periods" and loop is sampled and judge.delayed:
-                    # the crossovers of L leave out how a late input changes what is read; these models have the shift
-                    growth = [of.growth(of.poles(sampled.entries)).max(axis=1) for of in judge.delayed]
-                    violation = np.maximum(violation, np.max(growth, axis=0) / GROWTH_OF_DELAY)
-                found.append(violation)
-        return found
-
-    def _penalty(self, judge: Any, sampled: LoopMeasures) -> Real:
-        """The weighted violations of requirements on the loops (laws,)."""
-        total = np.zeros(sampled.L.shape[0])
-        for violation in self.violations(judge, sampled):
-            total += self.weight * np.maximum(violation, 0.0)
-        return total
+        entries = sampled.entries
+        return [
+            *self.loop_violations(0, sampled),
+            *self.loop_violations(1, measures_of(judge, entries, judge.also[0])),
+            *self._delay_violations(judge, entries),
+        ]
 
     def excess(self, judges: Sequence[Any], law: AnyLaw) -> float:
         """Return the sum of violations of a law on the models, the largest of the arms, without shifts."""
-        plain = replace(self, shifts=((), ()))
+        plain = replace(self, shifts=((), ()), weight=1.0)
         found = []
         for judge in judges:
-            entries = judge.entries(law)
-            loop = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
-            found.append(float(plain._penalty(judge, loop)[0]) / self.weight)
+            loop = measures_of(judge, judge.entries(law))
+            found.append(float(plain._penalty(plain.violations(judge, loop))[0]))
         return max(found)
 
     def simulated_score(self, judge: Any, slew: SlewMeasures, law: AnyLaw) -> float:
         """Return the score of one law with its slew; `LOST` where it is unstable on the model, or has no figure."""
-        entries = judge.entries(law)
-        if any(model.growth(model.poles(entries)).max() >= 0 for model in (judge.model, *judge.also)):
-            return LOST
-        measures = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
-        score = float((slowness(judge, entries) + self._penalty(judge, measures))[0])
-        speed = float(measures.dominant_time_constant(first_frequency(judge.arm))[0])
+        score = float(judge.score(law))
+        if score >= LOST or not self.by_simulation:
+            return score
         figures = slew.of(law)
-        if self.minimised == "settling_time_s":
-            # a tip that does not settle in the longest record: of such laws the fastest is the best
-            settled = min(figures[self.minimised], 100.0 * speed)
-            score += float(np.log(settled + SHARE_OF_SPEED * speed))
-        elif _is_of_slew(self.minimised):
-            score += float(np.log(max(figures[self.minimised], LEAST_SIZE)))
-        else:
-            score += float(np.log(max(float(measures.of(self.minimised)[0]), LEAST_SIZE)))
+        if _is_of_slew(self.minimised):
+            speed = float(self.value(judge, measures_of(judge, judge.entries(law)))[0])
+            value = figures[self.minimised]
+            if self.minimised.endswith("settling_time_s"):
+                # a tip that does not settle in the longest record: of such laws the fastest is the best
+                value = min(value, 100.0 * speed) + SHARE_OF_SPEED * speed
+            score += float(np.log(max(value, LEAST_SIZE) / speed))
         for each, shift in self.shifted(0):
             if each.measure.of_slew:
                 score += self.weight * max(each.violation(figures[each.name]) + shift, 0.0)
@@ -159,6 +199,11 @@ class Goal:
     def within_one_per_cent(score: float) -> float:
         """Return the score of a value one per cent larger."""
         return score + 0.01
+
+
+def measures_of(judge: Any, entries: Sequence[Entry], model: DesignModel | None = None) -> LoopMeasures:
+    """Return the measures of laws in the sampled loop of a judge, or in another of its models."""
+    return LoopMeasures(model or judge.model, entries, judge.chain.sampling.period)
 
 
 def slowness(judge: Any, entries: Sequence[Entry]) -> Real:
@@ -191,19 +236,26 @@ def _is_of_slew(name: str) -> bool:
     return Requirement(name, "<=", 1.0).measure.of_slew
 
 
-def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real) -> Real:
-    """Return the point of a simplex that begins at x, with the slew simulated on every arm."""
+def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real, share: float) -> Real:
+    """Return the point of a simplex that begins at x, with the slew simulated on every arm.
+
+    `share` is that of its usual size and number of steps.
+    """
     # modes of a slew that is simulated hundreds of times
     modes = 8
-    slews = [SlewMeasures(judge.arm, judge.known, judge.chain, modes) for judge in judges]
+    names = (goal.minimised, *(each.name for each in goal.requirements))
+    parts = tuple(each for each in PARTS if any(name.startswith(f"{each}.") for name in names))
+    slews = [SlewMeasures(judge.arm, judge.known, judge.chain, modes, parts) for judge in judges]
 
     def score(at: Real) -> float:
         law = form.record_at(at)
         return max(goal.simulated_score(judge, slew, law) for judge, slew in zip(judges, slews, strict=True))
 
     low, high = form.box
-    edges = np.diag(np.where(x + 0.02 * (high - low) > high, -1.0, 1.0) * 0.02 * (high - low))
-    options = {"initial_simplex": [x, *(x + edges)], "maxfev": 60 * form.size, "adaptive": form.size > 2}
+    step = 0.02 * share * (high - low)
+    edges = np.diag(np.where(x + step > high, -step, step))
+    most = int(60 * share * form.size)
+    options = {"initial_simplex": [x, *(x + edges)], "maxfev": most, "adaptive": form.size > 2}
     done = cast("Any", minimize)(
         score, x, method="Nelder-Mead", bounds=np.transpose(form.box), options=options
     )
@@ -229,7 +281,9 @@ def card_values(card: LoopCard) -> dict[str, float]:
         ratio = float(damping.ratio)
     return {
         "gain_margin_db": -np.inf if None in gain else min(cast("list[float]", gain)),
+        "gain_reduction_db": _or(card.gain_reduction.value, -np.inf),
         "phase_margin_deg": _or(card.phase_margin.value, -np.inf),
+        "delay_margin_ms": _or(card.delay_margin.value, -np.inf),
         "delay_margin_periods": _or(card.delay_margin_periods, -np.inf),
         "peak_sensitivity": _or(card.peak_sensitivity.value, np.inf),
         "disk_margin": _or(card.disk_margin, -np.inf),
@@ -242,16 +296,46 @@ def _or(value: float | None, other: float) -> float:
     return other if value is None else float(value)
 
 
+@lru_cache(64)
+def norm_bound(case: Case, weights: Weights) -> NormBound:
+    """Return the norm of the column of all weighted functions of a sampled loop, with its certified bound."""
+    case = admit_case(SAMPLED_LOOP, case)
+    return norm(case.arm, case.law, case.chain, weights=weights).bounds[-1]
+
+
+def _bandwidths(name: str, case: Case) -> dict[str, float]:
+    """Return the bandwidth of a loop, and its inverse, of the arm that the card grades."""
+    case = admit_case(SAMPLED_LOOP, case)
+    verdict = analysis_of(name, case.on(graded_arm(case.arm)[0])).verdict
+    found = bandwidth(verdict.full, verdict.frequencies)
+    return {"bandwidth_rad_s": found, "inverse_bandwidth_s": 1 / found}
+
+
+def loop_values(name: str, case: Case, weights: Weights | None) -> dict[str, float]:
+    """Return the exact measures of the loop of that name; the norm, of the sampled one with weights, by its bound."""
+    card = loop_card(name, case)
+    values = card_values(card)
+    if card.stability == "stable":
+        values |= _bandwidths(name, case)
+        if weights is not None and name == "sampled":
+            bound = norm_bound(case.on(graded_arm(case.arm)[0]), weights)
+            values[NORM] = bound.value if bound.upper is None else bound.upper
+    return values
+
+
 @lru_cache(256)
-def exact_values(case: Case, known: Arm | None) -> LoopValues:
-    """Return the measures of both loops of a case by the result card, and of the slew for an arm `known`, if any."""
+def exact_values(case: Case, known: Arm | None, weights: Weights | None = None) -> LoopValues:
+    """Return the measures of both loops of a case by the result card.
+
+    Those of the slew are for an arm `known`, if any, and the norm is the upper bound with the weights, if any.
+    """
     found: list[dict[str, float] | None] = []
     for name in ("sampled", "continuous"):
         if name == "continuous" and case.law.is_discrete:
             found.append(None)
             continue
         try:
-            found.append(card_values(loop_card(name, case)))
+            found.append(loop_values(name, case, weights))
         except ConvergenceError:
             found.append({})
     sampled = found[0] or {}
@@ -283,13 +367,13 @@ def check(goal: Goal, known: Arm, chain: Chain, named: NamedArm, law: AnyLaw) ->
 
     These are of the arm and the chain as they are given; slews are those of the arm `known`.
     """
-    values = exact_values(Case(named.arm, law, chain), known if goal.by_simulation else None)
+    values = exact_values(Case(named.arm, law, chain), known if goal.by_simulation else None, goal.weights)
     rows = []
     violations = np.full((2, len(goal.requirements)), -1.0)
     for n, each in enumerate(goal.requirements):
         shown = [None if of is None else of.get(each.name) for of in values]
         for loop, value in enumerate(shown):
-            if values[loop] is not None and not (loop and each.measure.of_slew):
+            if values[loop] is not None and (not loop or each.measure.is_of(loop)):
                 violations[loop, n] = np.inf if value is None else each.violation(value)
         rows.append(Checked(str(each), named.name, shown[0], shown[1], float(violations[:, n].max())))
     return rows, violations

@@ -1,14 +1,15 @@
-"""Gains K1 and K2 with which both loops meet the requirements of the grade *good*, and the fastest of them.
+"""Gains K1 and K2 with which both loops meet requirements: those of the grade *good* in the map of an arm.
 
-The requirements are measured on a grid of gains on models of few modes (`measures`); between its points the border is
-along straight lines.  It is approximate; the gains recommended are examined by the exact loops.
+The requirements are measured on a grid of gains on models of few modes (`measures`); on its columns the border is
+where the models pass a limit or the exact loop its stability, to a 250th of a cell.  Of the exact loops it is
+approximate; a search for the best gains begins there and ends by them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -19,57 +20,37 @@ from tfarm.arrays import Real
 from tfarm.crossing import Window
 from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.loop.plane import gain_map
-from tfarm.loop.plane_axes import Axis
+from tfarm.loop.plane import Plane, gain_map, moment_axis
+from tfarm.loop.plane_axes import Axis, rate_axis
 from tfarm.records import frozen
 from tfarm.spectrum.table import first_frequency
-from tfarm.synthesis.goals import Checked, Goal, check
+from tfarm.synthesis.goals import Goal, measures_of
 from tfarm.synthesis.judge import Judge, of_laws
-from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.models import DesignModel
 from tfarm.synthesis.required import RequirementTask
-from tfarm.synthesis.requirements import GOOD
+from tfarm.synthesis.requirements import GOOD, Requirement
 from tfarm.synthesis.structures import Entry, structure_of
-from tfarm.synthesis.worst_case import NamedArm
 
 # columns and rows of the grid over the map, and of the finer one around the region
 COARSE_GRID = (40, 50)
-FINE_GRID = (60, 44)
+FINE_GRID = (60, 24)
 # of unstable loops: as without any gain margin
 UNSTABLE_EXCESS = 1.0
-
-
-@frozen
-class RequiredGains:
-    """Gains with the requirements and their exact values in both loops."""
-
-    law: HubFeedback
-    requirements: tuple[Checked, ...]
-
-    @property
-    def is_met(self) -> bool:
-        """Whether the exact loops meet all requirements."""
-        return all(each.violation <= 0 for each in self.requirements)
-
-    @property
-    def missed(self) -> list[Checked]:
-        """The requirements that are not met."""
-        return [each for each in self.requirements if each.violation > 0]
 
 
 @frozen
 class GoodRegion:
     """The largest violation of the requirements, `excess` (rows, columns), at gains `x` across and `y` up.
 
-    `time_constant` [s] is that of the dominant pole of the sampled loop; inf where a loop is unstable.
+    `time_constant` [s] is that of the dominant pole of the sampled loop; inf where a loop is unstable.  The
+    `stable_intervals` of y, for each x, are those in which all requirements are met.
     """
 
-    judge: Judge
-    goal: Goal
     x: Real
     y: Real
     excess: Real
     time_constant: Real
+    stable_intervals: list[list[Window]]
 
     @property
     def met(self) -> Any:
@@ -77,65 +58,65 @@ class GoodRegion:
         return self.excess <= 0
 
     @property
-    def stable_intervals(self) -> list[list[Window]]:
-        """For each x the intervals of y in which all requirements are met."""
-        return [_intervals(self.y, column) for column in self.excess.T]
-
-    @cached_property
-    def recommended(self) -> RequiredGains:
-        """The gains that meet all requirements, by the exact loops, with the fastest poles of the first mode.
-
-        Where none do, those with the least violation.
-        """
+    def start(self) -> HubFeedback:
+        """The gains inside with the fastest poles of the first mode; else those with the least violation."""
         # gains of rate feedback: without it the requirements are met by no controller too
         excess = np.where(self.x > 0, self.excess, np.inf)
         # the exact loops have a little less than the models
-        for slack in (0.005, 0.03, 0.1, 0.2):
-            inside = excess <= -slack
-            if not inside.any():
-                break
-            chosen = self._checked(int(np.where(inside, self.time_constant, np.inf).argmin()))
-            if chosen.is_met:
-                return chosen
-        return self._checked(int(excess.argmin()))
-
-    def _checked(self, place: int) -> RequiredGains:
-        """Return the gains at a place of the grid with exact values."""
-        row, column = np.unravel_index(place, self.excess.shape)
-        # digits of a gain that is typed
-        K1, K2 = (float(f"{value:.4g}") for value in (self.x[column], self.y[row]))
-        law = HubFeedback(K1=K1, K2=K2)
-        arm = self.judge.known
-        rows, _ = check(self.goal, arm, self.judge.chain, NamedArm(arm.name, arm, {}), law)
-        return RequiredGains(law, tuple(rows))
+        inside = excess <= -0.005
+        values = np.where(inside, self.time_constant, np.inf) if inside.any() else excess
+        row, column = np.unravel_index(int(values.argmin()), values.shape)
+        return HubFeedback(K1=float(self.x[column]), K2=float(self.y[row]))
 
 
-def _intervals(y: Real, excess: Real) -> list[Window]:
-    """Return the intervals of y (n,) with an excess (n,) of at most 0, along straight lines."""
-    met = excess <= 0
-    ends = np.flatnonzero(met[1:] != met[:-1])
-    share = excess[ends] / (excess[ends] - excess[ends + 1])
-    edges = (y[ends] + share * np.diff(y)[ends]).tolist()
-    if met[0]:
-        edges.insert(0, float(y[0]))
-    if met[-1]:
-        edges.append(float(y[-1]))
-    return list(zip(edges[::2], edges[1::2], strict=True))
+def _intervals(
+    excess_of: Callable[[Sequence[Entry]], tuple[Real, Real]], found: GoodRegion, exact: Plane
+) -> list[list[Window]]:
+    """Return for each x the intervals of y in which all requirements are met, their ends found by halving.
+
+    No end is beyond an edge of the exact stability intervals of the continuous-time loop.
+    """
+    met = found.met
+    columns, rows = np.nonzero((met[1:] != met[:-1]).T)
+    inside = np.where(met[rows, columns], found.y[rows], found.y[rows + 1])
+    outside = np.where(met[rows, columns], found.y[rows + 1], found.y[rows])
+    for n, (column, y) in enumerate(zip(columns.tolist(), inside.tolist(), strict=True)):
+        stable = [each for each in exact.stable_intervals[column] if each[0] <= y <= each[1]]
+        if stable:
+            outside[n] = np.clip(outside[n], *stable[0])
+    # to a 250th of a step of the grid
+    for _ in range(8 if rows.size else 0):
+        middle = (inside + outside) / 2
+        excess, _ = excess_of(_entries(found.x[columns], middle))
+        inside = np.where(excess <= 0, middle, inside)
+        outside = np.where(excess <= 0, outside, middle)
+    intervals = []
+    for number, column in enumerate(met.T):
+        ends = inside[columns == number].tolist()
+        if column[0]:
+            ends.insert(0, float(found.y[0]))
+        if column[-1]:
+            ends.append(float(found.y[-1]))
+        intervals.append(list(zip(ends[::2], ends[1::2], strict=True)))
+    return intervals
 
 
 @lru_cache(maxsize=8)
-def good_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GoodRegion | None:
+def good_region(
+    arm: Arm, x: Axis, y: Axis, chain: Chain, requirements: tuple[Requirement, ...] = GOOD
+) -> GoodRegion | None:
     """Return the region in a picture of these axes; None where it has no stable gains or no models.
 
     A coarse grid finds it, a finer one around it has its border.
     """
     try:
         form = structure_of(TWO_GAINS, arm, Kp=0.0, modes=2, period=chain.sampling.period, bounds={})
-        task = RequirementTask(arm, GOOD, "time_constant_s", form, 2, chain, lambda *_: None)
+        task = RequirementTask(arm, requirements, "time_constant_s", form, 2, chain, lambda *_: None)
         judge = task.judge(arm, task.goal, 0)
         found = _measured(judge, task.goal, arm, x.grid(COARSE_GRID[0]), _with_zero(y.grid(COARSE_GRID[1])))
         if found.excess.min() >= UNSTABLE_EXCESS:
             return None
+        judge = _denser(judge)
         # a region that is thin on a grid may go on beyond, or lie between its rows
         for _ in range(3):
             inside = found.excess <= max(0.0, float(found.excess.min()))
@@ -147,11 +128,21 @@ def good_region(arm: Arm, x: Axis, y: Axis, chain: Chain) -> GoodRegion | None:
             found = _measured(judge, task.goal, arm, fine_x, fine_y)
             across = found.met.any(axis=0)
             up = found.met.any(axis=1)
-            if not is_coarse and not (_goes_on(x, found.x, across) or _goes_on(y, found.y, up)):
+            goes_on = is_coarse or _goes_on(x, found.x, across) or _goes_on(y, found.y, up)
+            if not goes_on and up.sum() > FINE_GRID[1] // 3:
                 break
-        return found
+        exact = gain_map(arm, found.x, found.y)
+        intervals = _intervals(partial(_of_laws, judge, task.goal), found, exact)
+        return replace(found, stable_intervals=intervals)
     except (ConvergenceError, ParameterError):
         return None
+
+
+def map_region(arm: Arm, chain: Chain, requirements: tuple[Requirement, ...]) -> GoodRegion | None:
+    """Return the region in the map of an arm, of the requirements on its loops; None as above, or of none of these."""
+    x = rate_axis(arm)
+    of_loops = tuple(each for each in requirements if each.measure.is_of(1))
+    return good_region(arm, x, moment_axis(arm, x), chain, of_loops) if of_loops else None
 
 
 def _around(axis: Axis, values: Real, inside: Any, number: int) -> Real:
@@ -177,43 +168,55 @@ def _goes_on(axis: Axis, values: Real, met: Any) -> bool:
     return bool((met[0] and values[0] > axis.low) or (met[-1] and values[-1] < axis.high))
 
 
+def _denser(judge: Judge) -> Judge:
+    """Return a judge with denser grids of frequency: its border is that of the result cards within 1 % of a limit."""
+    continuous, *others = judge.also
+    return replace(judge, model=_cut(judge.model, 2), also=(_cut(continuous, 4), *others))
+
+
+def _cut(model: DesignModel, parts: int) -> DesignModel:
+    """Return a model on a grid with every step cut into parts."""
+    q = model.angles
+    places = np.arange((q.size - 1) * parts + 1) / parts
+    return replace(model, grid=lambda: np.interp(places, np.arange(q.size), q))
+
+
 def _entries(x: Real, y: Real) -> list[Entry]:
-    """Return the entries of the gains of a grid, row by row."""
-    grids = np.meshgrid(x, y)
-    return [Entry(OUTPUT_OF[name], grid.reshape(1, -1)) for name, grid in zip(PLANE, grids, strict=True)]
+    """Return the entries of gains (laws,)."""
+    return [Entry(OUTPUT_OF[name], values[None]) for name, values in zip(PLANE, (x, y), strict=True)]
 
 
-def _stable(entries: Sequence[Entry], laws: Any, models: Sequence[DesignModel]) -> Any:
-    """Return those of the laws that are stable on all models."""
-    for model in models:
-        if laws.size:
-            laws = laws[model.growth(model.poles(of_laws(entries, laws))).max(axis=1) < 0]
-    return laws
+def _of_laws(judge: Judge, goal: Goal, entries: Sequence[Entry]) -> tuple[Real, Real]:
+    """Return largest violation and dominant time constant [s] of laws (laws,) by the models of a judge.
+
+    Those that meet the requirements are stable on all models: for an arm without damping on the large ones too.
+    """
+    laws = np.arange(entries[0].num.shape[1])
+    excess = np.full(laws.size, UNSTABLE_EXCESS)
+    time_constant = np.full(laws.size, np.inf)
+    # of some laws at once: each has some thousand points of L
+    for some in np.array_split(laws, laws.size // 100 + 1):
+        growth = judge.model.growth(judge.model.poles(of_laws(entries, some)))
+        is_stable = growth.max(axis=1, initial=-np.inf) < 0
+        if is_stable.any():
+            sampled = measures_of(judge, of_laws(entries, some[is_stable]))
+            worst = np.max(goal.violations(judge, sampled), axis=0)
+            excess[some[is_stable]] = np.minimum(worst, UNSTABLE_EXCESS)
+            time_constant[some[is_stable]] = sampled.dominant_time_constant(first_frequency(judge.arm))
+    for model in judge.also:
+        met = np.flatnonzero(excess <= 0)
+        if met.size:
+            growth = model.growth(model.poles(of_laws(entries, met))).max(axis=1)
+            excess[met[growth >= 0]] = UNSTABLE_EXCESS
+    return excess, time_constant
 
 
 def _measured(judge: Judge, goal: Goal, arm: Arm, x: Real, y: Real) -> GoodRegion:
     """Return the violations over a grid; the continuous-time loop of the arm is stable by its exact count."""
-    entries = _entries(x, y)
+    across, up = (each.ravel() for each in np.meshgrid(x, y))
+    excess = np.full(across.size, UNSTABLE_EXCESS)
+    time_constant = np.full(across.size, np.inf)
     known = np.flatnonzero(gain_map(arm, x, y).unstable == 0)
-    left = _stable(entries, known, (judge.model, judge.also[0]))
-    excess = np.full(x.size * y.size, UNSTABLE_EXCESS)
-    time_constant = np.full(x.size * y.size, np.inf)
-    # of some laws at once: each has some thousand points of L
-    for some in np.array_split(left, left.size // 100 + 1):
-        if some.size:
-            own = of_laws(entries, some)
-            sampled = LoopMeasures(judge.model, own, judge.model.poles(own), judge.chain.sampling.period)
-            worst = np.max(goal.violations(judge, sampled), axis=0)
-            excess[some] = np.minimum(worst, UNSTABLE_EXCESS)
-            time_constant[some] = sampled.dominant_time_constant(first_frequency(arm))
+    excess[known], time_constant[known] = _of_laws(judge, goal, _entries(across[known], up[known]))
     shape = (y.size, x.size)
-    return _stable_on_all(GoodRegion(judge, goal, x, y, excess.reshape(shape), time_constant.reshape(shape)))
-
-
-def _stable_on_all(found: GoodRegion) -> GoodRegion:
-    """Return the region without gains that are unstable by the large models of an arm without damping."""
-    met = np.flatnonzero(found.met)
-    stable = _stable(_entries(found.x, found.y), met, found.judge.also[1:])
-    excess = found.excess.copy()
-    excess.ravel()[np.setdiff1d(met, stable)] = UNSTABLE_EXCESS
-    return replace(found, excess=excess)
+    return GoodRegion(x, y, excess.reshape(shape), time_constant.reshape(shape), [])

@@ -101,8 +101,11 @@ def delay(model: DesignModel, L: Complex) -> Real:
 
     A law is without limit where `RESERVE` L passes 1 nowhere either: a resonance peaks between two points of the grid.
     """
-    late = _passing_delay(model, L)
-    return np.where(late < longest_delay(model), late, _passing_delay(model, RESERVE * L))
+    late = _passing_delay(model, gain_crossings(L), len(L))
+    longest = np.flatnonzero(late >= longest_delay(model))
+    if longest.size:
+        late[longest] = _passing_delay(model, gain_crossings(RESERVE * L[longest]), longest.size)
+    return late
 
 
 def longest_delay(model: DesignModel) -> float:
@@ -110,29 +113,43 @@ def longest_delay(model: DesignModel) -> float:
     return 100.0 * (model.period or 1.0)
 
 
-def _passing_delay(model: DesignModel, L: Complex) -> Real:
+def _passing_delay(model: DesignModel, crossings: "Crossings", laws: int) -> Real:
     """Return that delay [s] by the passages between points of the grid alone, at most the longest."""
     q = model.angles
-    passes, share, late = gain_crossings(L)
-    late = late / (q[:-1] + share * np.diff(q))
-    longest = longest_delay(model)
-    return np.where(passes, (model.period or 1.0) * late, longest).min(axis=1, initial=longest)
+    n = crossings.place
+    late = crossings.lag / (q[n] + crossings.share * (q[n + 1] - q[n]))
+    return least_of(crossings.law, (model.period or 1.0) * late, laws, longest_delay(model))
 
 
-def gain_crossings(L: Complex) -> tuple[Any, Real, Real]:
-    """Return where |L| (laws, m) passes 1 between two points of the grid, the share of the way, and the lag to -1.
+class Crossings(NamedTuple):
+    """Passages of |L| through 1 of many laws: number of the `law`, and point of the grid before, each (k,).
 
-    Each is (laws, m - 1), along straight lines; the lag [rad] is in [0, 2 pi).
+    The `share` of the way to the next point and the `lag` to -1 [rad], in [0, 2 pi), are along straight lines.
     """
-    around = 2 * np.pi
-    size = np.log(np.maximum(abs(L), LEAST_SIZE))
-    turn = np.mod(np.pi + np.unwrap(np.angle(L)), around)
-    here = size[:, :-1]
-    change = np.diff(size)
-    passes = (size[:, 1:] * here <= 0) & (change != 0)
-    share = here / np.where(passes, -change, 1.0)
-    step = np.mod(np.diff(turn) + np.pi, around) - np.pi
-    return passes, share, np.mod(turn[:, :-1] + share * step, around)
+
+    law: Any
+    place: Any
+    share: Real
+    lag: Real
+
+
+def gain_crossings(L: Complex) -> Crossings:
+    """Return the passages of |L| (laws, m) through 1 between two points of the grid."""
+    is_above = L.real**2 + L.imag**2 > 1.0
+    law, place = np.nonzero(is_above[:, 1:] != is_above[:, :-1])
+    here = L[law, place]
+    there = L[law, place + 1]
+    size = np.log(np.maximum(abs(here), LEAST_SIZE))
+    share = size / (size - np.log(np.maximum(abs(there), LEAST_SIZE)))
+    step = np.angle(there * here.conj())
+    return Crossings(law, place, share, np.mod(np.pi + np.angle(here) + share * step, 2 * np.pi))
+
+
+def least_of(law: Any, values: Real, laws: int, most: float) -> Real:
+    """Return the least of the values (k,) of each law (laws,), at most `most`."""
+    found = np.full(laws, most)
+    np.minimum.at(found, law, values)
+    return found
 
 
 def peak_of(model: DesignModel, distance: Any) -> Any:
@@ -155,6 +172,24 @@ class Objective(NamedTuple):
     of_slew: bool = False
     of_poles: bool = False
     needs_speed: bool = False
+
+    def aims(self, judge: Any, entries: Sequence[Entry], limits: Real) -> Real:
+        """Return the objective by the judge's own model alone; of its poles `LOST` and more where one is unstable."""
+        if not self.of_poles:
+            # slews of unstable laws
+            with np.errstate(all="ignore"):
+                return np.nan_to_num(self.scores(judge, entries, None), nan=np.inf)
+        poles = judge.model.poles(entries)
+        growth = judge.model.growth(poles).max(axis=1)
+        scores = lost(1, growth)
+        stable = growth < 0
+        if stable.any():
+            scores[stable] = self.scores(judge, of_laws(entries, stable), poles[stable])
+            if self.needs_speed:
+                slow = dominant_time_constant(judge.model, poles[stable], first_frequency(judge.arm))
+                excess = slow / slowest_allowed(judge.arm, judge.chain.sampling.period)
+                scores[stable] += np.where(excess > 1, TOO_SLOW * excess, 0.0)
+        return scores
 
     def within_one_per_cent(self, score: float) -> float:
         """Return the score of a value one per cent worse."""
@@ -224,24 +259,6 @@ class Judge:
     def score(self, law: AnyLaw) -> float:
         """Return the function to be minimised, of one law."""
         return float(scores_of([self], self.entries(law), np.array([np.inf]))[0])
-
-    def aims(self, entries: Sequence[Entry]) -> Real:
-        """Return the objective by the judge's own model alone; of its poles `LOST` and more where one is unstable."""
-        if not self.objective.of_poles:
-            # slews of unstable laws
-            with np.errstate(all="ignore"):
-                return np.nan_to_num(self.objective.scores(self, entries, None), nan=np.inf)
-        poles = self.model.poles(entries)
-        growth = self.model.growth(poles).max(axis=1)
-        scores = lost(1, growth)
-        stable = growth < 0
-        if stable.any():
-            scores[stable] = self.objective.scores(self, of_laws(entries, stable), poles[stable])
-            if self.objective.needs_speed:
-                slow = dominant_time_constant(self.model, poles[stable], first_frequency(self.arm))
-                excess = slow / slowest_allowed(self.arm, self.chain.sampling.period)
-                scores[stable] += np.where(excess > 1, TOO_SLOW * excess, 0.0)
-        return scores
 
     # ------------------------------------------------------------ beyond it
 
@@ -382,9 +399,9 @@ def judge_of(
     speed = 2 / chain.sampling.period
     if continuous:
         # an error in a search would be lost
-        own = (chain.reference.profile, chain.reference.shaper)
+        own = (chain.reference.profile, chain.reference.shaper, chain.reference.feedforward)
         remedy = "the continuous-time residual is that of a bang-bang slew without a shaper: leave them out"
-        require(not aim.of_slew or own == ("bang-bang", "none"), "reference", " ".join(own), remedy)
+        require(not aim.of_slew or own == ("bang-bang", "none", "rigid"), "reference", " ".join(own), remedy)
         model = continuous_model(arm, signals, modes, 2 * count, speed)
         return Judge(arm, known, chain, aim, model, ())
     model = sampled_model(arm, chain, signals, modes, count)
@@ -423,7 +440,9 @@ def _add_aims(
     for judge in judges:
         left = np.flatnonzero(which & (scores <= limits) & (scores < LOST))
         if left.size:
-            scores[left] = np.maximum(scores[left], judge.aims(of_laws(entries, left)))
+            scores[left] = np.maximum(
+                scores[left], judge.objective.aims(judge, of_laws(entries, left), limits[left])
+            )
 
 
 def of_laws(entries: Sequence[Entry], laws: Any) -> list[Entry]:

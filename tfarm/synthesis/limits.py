@@ -10,8 +10,8 @@ import numpy as np
 from tfarm.assessment.card import LoopCard, ResultCard
 from tfarm.spectrum import Modes
 from tfarm.synthesis.goals import card_values
-from tfarm.synthesis.good_region import RequiredGains
 from tfarm.synthesis.requirements import GOOD, Requirement
+from tfarm.synthesis.result import Design
 
 
 class LimitingMargin(NamedTuple):
@@ -45,7 +45,7 @@ class LoopLimits(NamedTuple):
     card: ResultCard
     limiting: LimitingMargin | None
     costs: tuple[SamplingCost, ...]
-    recommended: RequiredGains | None
+    recommended: Design | None
     recommended_card: ResultCard | None
 
     @property
@@ -58,7 +58,7 @@ class LoopLimits(NamedTuple):
 def loop_limits(
     card: ResultCard,
     modes: Modes,
-    recommended: RequiredGains | None = None,
+    recommended: Design | None = None,
     recommended_card: ResultCard | None = None,
 ) -> LoopLimits:
     """Return the limits of a controller by its card, the modes of its arm, and the gains recommended in its place."""

@@ -13,15 +13,16 @@ A is that of the closed loop, r the feed-forward, w the input, D_k the direct te
 reference has states: its angle, rate and acceleration, constant over each half of the slew.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
 
 from tfarm.arm import AnyLaw, Arm
 from tfarm.arm.blocks import Matrices
+from tfarm.arm.weights import Weights
 from tfarm.arrays import LEAST_SIZE, Complex, Real
 from tfarm.dsp import Chain, Scenario
 from tfarm.dsp.pulse import PulseTransfer
@@ -43,8 +44,9 @@ class DesignModel:
     `speed` [1/s] is c, the unit of a law's s.  `grid` gives angles (m,) of the circle [rad] or frequencies [rad/s], and
     `response` the signals (signals, k) at k of them.  The damping of poles counts below `band` [rad/s], without one
     each near the poles of open-loop modes `higher`, the highest first.  `last` is the state with the input of the last
-    sample; `own_moment` (n,) is the row of the arm's own root moment, before the anti-alias filter.
-    `alone` are the poles of the modes of the sampled arm without a law, by their numbers.
+    sample; `own_moment` (n,) is the row of the arm's own root moment, before the anti-alias filter.  `alone` are the
+    poles of the modes of the sampled arm without a law, by their numbers.  A `rate` is the filtered difference of the
+    angle, which it is a factor of; `weights` are those of a norm.
     """
 
     plant: Matrices
@@ -58,8 +60,8 @@ class DesignModel:
     last: int
     own_moment: Real
     alone: dict[int, complex]
-
-    # ------------------------------------------------------------ laws in states
+    rate: Callable[[Complex], Complex] | None = None
+    weights: Weights | None = None
 
     def states(self, entries: Sequence[Entry]) -> Matrices:
         """Return A (laws, k, k), B (laws, k, signals), C (laws, 1, k), D (laws, 1, signals) of laws."""
@@ -115,8 +117,6 @@ class DesignModel:
         found[:, n:] += Bk @ read
         return found
 
-    # ------------------------------------------------------------ poles
-
     def poles(self, entries: Sequence[Entry], share: float = 1.0) -> Complex:
         """Return closed-loop poles (laws, n), of a matrix that is not finite far outside."""
         found = self.closed_matrices(self.states(entries), share)
@@ -138,36 +138,50 @@ class DesignModel:
             return poles
         return np.log(np.where(poles == 0, np.e, poles))
 
-    # ------------------------------------------------------------ loop function
-
     @cached_property
     def angles(self) -> Real:
         """The grid (m,)."""
         return self.grid()
 
     @cached_property
-    def responses(self) -> Complex:
-        """The signals (signals, m) at all angles."""
-        return self.response(self.angles)
+    def responses(self) -> tuple[Complex, Complex]:
+        """The s (m,) of laws, and the signals (signals, m), at all angles."""
+        return self.responses_at(self.angles)
+
+    def s_at(self, angles: Real) -> Complex:
+        """Return the s of laws at angles, of a sampled loop by Tustin's rule."""
+        s = 1j * angles
+        if self.period is None:
+            return s
+        z = np.exp(s)
+        # at z = -1 Tustin's s is infinite
+        return self.speed * (z - 1) / np.where(abs(z + 1) < 1e-12, 1e-12, z + 1)
+
+    def responses_at(self, angles: Real) -> tuple[Complex, Complex]:
+        """Return the s of laws and the signals (signals, m) or (signals, laws, m) at angles (m,) or (laws, m)."""
+        return self.s_at(angles), self.response(angles.ravel()).reshape(-1, *angles.shape)
 
     def loop(self, entries: Sequence[Entry], angles: Real | None = None) -> Complex:
-        """Return L (laws, m) at the model's own angles, or at others."""
-        q = self.angles
-        response = self.responses
-        if angles is not None:
-            q = np.asarray(angles)
-            response = self.response(q)
-        s = 1j * q
-        if self.period is not None:
-            z = np.exp(s)
-            # at z = -1 Tustin's s is infinite
-            s = self.speed * (z - 1) / np.where(abs(z + 1) < 1e-12, 1e-12, z + 1)
-        total = 0.0
-        for signal, num, den in entries:
-            # (laws, m)
-            through = np.polyval(num[:, :, None], s) / np.polyval(den[:, :, None], s)
+        """Return L (laws, m) at the model's own angles, or at others (m,) or (laws, m)."""
+        s, response = self.responses if angles is None else self.responses_at(np.asarray(angles))
+        total: Any = 0.0
+        for signal, through in controllers(entries, s):
             total = total + through * response[self.signals.index(signal)]
         return np.asarray(total)
+
+
+def controllers(entries: Sequence[Entry], s: Complex) -> Iterator[tuple[str, Complex]]:
+    """Yield each signal with its entry of the laws (laws, m) at s (m,) or (laws, m)."""
+    for signal, num, den in entries:
+        yield signal, values_of(num, s) / values_of(den, s)
+
+
+def values_of(polynomial: Real, s: Complex) -> Any:
+    """Return polynomials (degree + 1, laws) at s (m,), (laws, m); of constants (laws, 1)."""
+    total: Any = polynomial[0][:, None]
+    for row in polynomial[1:]:
+        total = total * s + row[:, None]
+    return total
 
 
 def continuous_model(arm: Arm, signals: tuple[str, ...], modes: int, count: int, speed: float) -> DesignModel:
@@ -221,6 +235,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         missing = damped + ("hub_angle" not in signals)
     gone = range(first, first + missing)
     response: Callable[[Complex], Complex] = pulse
+    rate = None
     if by_difference:
         a = np.exp(-chain.converters.rate_filter * T)
         n = read.index("hub_angle")
@@ -228,9 +243,12 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         A, B, C = difference_rate(A, B, C, n, row, a, T, angle)
         own = np.append(own, 0.0)
 
+        def rate(z: Complex) -> Complex:
+            return (1 - a) / T * (z - 1) / (z - a)
+
         def response(z: Complex) -> Complex:
             found = pulse(z)
-            found[row] = (1 - a) / T * (z - 1) / (z - a) * found[n]
+            found[row] = rate(z) * found[n]
             return found
 
     A = np.delete(np.delete(A, gone, 0), gone, 1)
@@ -251,6 +269,7 @@ def sampled_model(arm: Arm, chain: Chain, signals: tuple[str, ...], modes: int, 
         first + 2 - missing,
         np.delete(own, gone),
         modes_alone(pulse),
+        rate,
     )
 
 

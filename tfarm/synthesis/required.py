@@ -16,6 +16,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from tfarm.arm import ANGLE_GAIN, TWO_GAINS, AnyLaw, Arm
+from tfarm.arm.weights import Weights
 from tfarm.arrays import Real
 from tfarm.assessment.card import graded_arm
 from tfarm.case import Case
@@ -25,9 +26,17 @@ from tfarm.loop.edges import most_modes
 from tfarm.loop.sampled_verdict import sampled_verdict
 from tfarm.records import frozen
 from tfarm.schema import Quantity
-from tfarm.synthesis.goals import WEIGHT, Checked, Goal, check, exact_values, polished
+from tfarm.synthesis.goals import (
+    WEIGHT,
+    Checked,
+    Goal,
+    check,
+    exact_values,
+    loop_values,
+    measures_of,
+    polished,
+)
 from tfarm.synthesis.judge import LOST, Judge, judge_of, model_sizes
-from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.models import sampled_model
 from tfarm.synthesis.requirements import MEASURES, Requirement
 from tfarm.synthesis.search import Search, Worst, search
@@ -38,6 +47,8 @@ from tfarm.synthesis.worst_case import Effort, NamedArm, Tell
 MET = 1e-3
 # and without one requirement, where the others are looked at
 NEAR = 0.05
+# by the exact loops: up to it a simplex corrects the law, beyond it a search
+SMALL = 0.1
 DELAY = "delay_margin_periods"
 
 
@@ -86,11 +97,12 @@ class RequirementTask:
     modes: int
     chain: Chain
     tell: Tell
+    weights: Weights | None = None
 
     @property
     def goal(self) -> Goal:
         """The goal without shifts."""
-        return Goal(self.requirements, self.minimised)
+        return Goal(self.requirements, self.minimised, weights=self.weights)
 
     def judge(self, on: Arm, goal: Goal, step: int) -> Judge:
         """Return the judge of laws on an arm by the models of a step of their sizes, with the delays required.
@@ -106,6 +118,8 @@ class RequirementTask:
             most = model_sizes(on, self.chain, self.modes, continuous=False)[0]
             own = judge_of(on, self.arm, self.chain, goal, self.form.signals, self.modes, most)
             found = replace(found, also=(*found.also, own.model, *own.also))
+        if goal.weights is not None:
+            found = replace(found, model=replace(found.model, weights=goal.weights))
         sampling = found.chain.sampling
         delays = list(goal.delays)
         for each, shift in goal.shifted(0):
@@ -132,11 +146,19 @@ class RequirementTask:
         best: RequiredLaw | None = None
         sizes = [model_sizes(each.arm, self.chain, self.modes, continuous=False) for each in named]
         step = 0
+        chosen: RequiredLaw | None = None
         # with the large models of undamped arms a search takes a minute
         attempts = 2 if any(each.arm.has_elastic_link for each in named) else 6
         for attempt in range(attempts):
             judges = tuple(self.judge(each.arm, goal, step) for each in named)
-            found = search(Worst(judges[::-1]), form, self.tell, near, effort if attempt == 0 else "near")
+            worst = Worst(judges[::-1])
+            share = 1.0
+            if chosen is not None and chosen.violation < SMALL:
+                # a small correction moves the best law little
+                found = chosen.search._replace(found=[(chosen.score, chosen.x)])
+                share = 0.25
+            else:
+                found = search(worst, form, self.tell, near, effort if attempt == 0 else "near")
             form = found.form
             law = form.record_at(found.found[0][1])
             if found.found[0][0] >= LOST:
@@ -144,7 +166,7 @@ class RequirementTask:
             if effort == "sketch":
                 return RequiredLaw(Worst(judges), found, *found.found[0], law, goal, ())
             candidates = (
-                self.examine(named, judges, found, x, goal) for score, x in found.found if score < LOST
+                self.examine(named, judges, found, x, goal, share) for score, x in found.found if score < LOST
             )
             # the best on the models may be unstable by a mode that they leave out
             chosen = next((each for each in candidates if np.isfinite(each.violation)), None)
@@ -170,16 +192,21 @@ class RequirementTask:
         return best
 
     def examine(
-        self, named: Sequence[NamedArm], judges: tuple[Judge, ...], found: Search, x: Real, goal: Goal
+        self,
+        named: Sequence[NamedArm],
+        judges: tuple[Judge, ...],
+        found: Search,
+        x: Real,
+        goal: Goal,
+        share: float = 1.0,
     ) -> RequiredLaw:
-        """Return a law that was found, with the exact values of all requirements on each arm.
+        """Return the end of a simplex from a point, with the exact values of all requirements on each arm.
 
-        For a quantity of the slew it is that of a simplex from there, unless the exact loop of that is unstable.
+        Where the exact loop of that is unstable, it is the law at the point.
         """
-        if goal.by_simulation:
-            better = self._exact(named, judges, found, polished(goal, judges, found.form, x), goal)
-            if np.isfinite(better.violation):
-                return better
+        better = self._exact(named, judges, found, polished(goal, judges, found.form, x, share), goal)
+        if np.isfinite(better.violation):
+            return better
         return self._exact(named, judges, found, x, goal)
 
     def _exact(
@@ -187,7 +214,9 @@ class RequirementTask:
     ) -> RequiredLaw:
         """Return the law at x with the exact values of all requirements on each arm."""
         form = found.form
-        law = form.record_at(x)
+        coefficients = form.typed(x)
+        law = form.record_of(coefficients)
+        x = form.at(coefficients)
         score = float(Worst(judges).scores(form, x[:, None])[0])
         rows = []
         violations = np.full((2, len(self.requirements)), -1.0)
@@ -218,22 +247,63 @@ class RequirementTask:
     def values_on(self, on: Arm, law: AnyLaw) -> dict[str, float]:
         """Return the exact measures of a law on an arm, of the sampled loop, with its slew where that is minimised."""
         known = self.arm if MEASURES[self.minimised].of_slew else None
-        return exact_values(Case(on, law, self.chain), known).sampled
+        return exact_values(Case(on, law, self.chain), known, self.weights).sampled
 
     def value_on(self, judge: Judge, on: Arm, law: AnyLaw) -> float:
         """Return the quantity of a law that is minimised, on an arm of a judge."""
-        return self.values_on(on, law)[self.minimised]
+        return self.values_on(on, law).get(self.minimised, np.inf)
 
     def meets(self, named: Sequence[NamedArm]) -> bool:
         """Return whether a law of the structure meets all requirements on all arms."""
         with suppress(ConvergenceError):
-            return self.find(named, None, "near").violation <= 0
+            near = self._nearly_met(named, self.form, None)
+            return near is not None and self.find(named, near, "near").violation <= 0
         return False
 
+    def _nearly_met(
+        self, named: Sequence[NamedArm], form: Structure, near: Real | None
+    ) -> RequiredLaw | None:
+        """Return a law by the models alone that violates the requirements by less than `NEAR`, None without one.
+
+        A sketch tells whether there is one, if its law is far from it.
+        """
+        # of violations: a whole search hardly finds so much less than a sketch
+        far = 0.5
+        judges = tuple(self.judge(each.arm, self.goal, 0) for each in named)
+        for effort in ("sketch", "near"):
+            found = search(Worst(judges[::-1]), form, self.tell, near, effort)
+            score, x = found.found[0]
+            law = found.form.record_at(x)
+            excess = self.goal.excess(judges, law)
+            if score < LOST and excess <= NEAR:
+                return RequiredLaw(Worst(judges), found, score, x, law, self.goal, ())
+            if score >= LOST or excess > far:
+                break
+        return None
+
     def score_on(self, choice: RequiredLaw, on: Arm) -> float:
-        """Return the score of a law on another arm; inf where the loop is unstable."""
-        score = self.judge(on, choice.goal, 0).score(choice.law)
-        return score if score < LOST else np.inf
+        """Return the value of a law on another arm, e^(w v) times as much under a violation v; inf if unstable.
+
+        Of logarithms one per cent more would say nothing.
+        """
+        judge = self.judge(on, choice.goal, 0)
+        value = choice.goal.value(judge, measures_of(judge, judge.entries(choice.law)))[0]
+        score = float(np.log(value)) + choice.goal.weight * self.violation_on(choice, on)
+        return float(np.exp(score)) if score < np.log(LOST) else np.inf
+
+    def violation_on(self, choice: RequiredLaw, on: Arm) -> float:
+        """Return the largest violation of a requirement on an arm, 0 where all are met; inf of an unstable loop.
+
+        By the exact loops where the models are near a limit; after a sketch, which has not examined the law, by the
+        models.
+        """
+        # of a limit: an arm with more left by the models has some left by the exact loops
+        near = 0.01
+        by_models = violation_by_models(self.judge(on, choice.goal, 0), choice)
+        if by_models < -near or not choice.checked:
+            return max(0.0, by_models)
+        rows, _ = check(choice.goal, self.arm, self.chain, NamedArm(on.name, on, {}), choice.law)
+        return max(0.0, *(each.violation for each in rows))
 
     def without(self, name: str) -> RequirementTask:
         """Return the task without the requirement of this name."""
@@ -241,39 +311,51 @@ class RequirementTask:
 
     def conflicts(self, choice: RequiredLaw, named: Sequence[NamedArm]) -> tuple[str, ...]:
         """Return the requirements without which the others are met, near a law that does not meet them all."""
-        found = []
-        for each in self.requirements:
-            task = self.without(each.name)
-            judges = tuple(task.judge(of.arm, task.goal, 0) for of in named)
-            result = search(Worst(judges[::-1]), choice.search.form, self.tell, choice.x, "near")
-            law = result.form.record_at(result.found[0][1])
-            if task.goal.excess(judges, law) <= NEAR:
-                found.append(str(each))
-        return tuple(found)
+        form = choice.search.form
+        return tuple(
+            str(each)
+            for each in self.requirements
+            if self.without(each.name)._nearly_met(named, form, choice.x) is not None
+        )
 
     def sensitivities(self, choice: RequiredLaw) -> list[RequirementSlope]:
-        """Return the changes of the required quantities of the sampled loop by the model of the first arm.
+        """Return the changes of the required quantities of the exact sampled loop, by differences.
 
         A margin without a limit has none.
         """
-        judge = choice.worst.judges[0]
         form = choice.search.form
-        at = form.coefficients(choice.x[:, None])
         change = 0.001
         found = []
         for n, coefficient in enumerate(form.names):
-            c = np.repeat(at, 2, axis=1)
-            c[n] *= (1 + change, 1 - change)
-            entries = form.entries(c)
-            loop = LoopMeasures(judge.model, entries, judge.model.poles(entries), judge.chain.sampling.period)
+            cards = []
+            for factor in (1 + change, 1 - change):
+                c = form.coefficients(choice.x)
+                c[n] *= factor
+                case = Case(self.arm, form.record_at(form.at(c)), self.chain)
+                cards.append(loop_values("sampled", case, self.weights))
             for each in self.requirements:
-                if each.measure.of_slew:
+                if not each.measure.is_of(0):
                     continue
-                values = loop.of(each.name)
-                if np.isfinite(values).all():
-                    slope = float(values[0] - values[1]) / (2 * change) / 100
+                above, below = (values.get(each.name, np.inf) for values in cards)
+                slope = (above - below) / (2 * change) / 100
+                if np.isfinite(slope):
                     found.append(RequirementSlope(str(each), coefficient, slope))
         return found
+
+
+def violation_by_models(judge: Judge, choice: RequiredLaw) -> float:
+    """Return the largest violation on the models of both loops, negative where all are met; 0 where a slew decides."""
+    entries = judge.entries(choice.law)
+    wanted = choice.goal.requirements
+    found = [0.0] if any(each.measure.of_slew for each in wanted) else []
+    for number, model in enumerate((judge.model, *judge.also[:1])):
+        loop = measures_of(judge, entries, model)
+        if loop.growth.max() >= 0:
+            return np.inf
+        found += [
+            float(each.violations(loop.of(each.name))[0]) for each in wanted if each.measure.is_of(number)
+        ]
+    return max(found)
 
 
 def is_active(checked: Checked) -> bool:

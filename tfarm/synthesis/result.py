@@ -3,6 +3,7 @@
 from typing import Annotated, Any, Literal, NamedTuple
 
 from tfarm.dsp import Chain
+from tfarm.loop.norms import NormBound
 from tfarm.loop.sampled_brief import SampledBrief
 from tfarm.loop.stability import Stability
 from tfarm.records import frozen
@@ -11,6 +12,8 @@ from tfarm.synthesis.drawn import Verification
 from tfarm.synthesis.goals import Checked
 from tfarm.synthesis.models import slew_and_after, trial_slew
 from tfarm.synthesis.required import RequirementSlope, is_active, names_of
+from tfarm.synthesis.requirements import MEASURES, NAMES, requirements_of
+from tfarm.synthesis.slew_measures import SlewMeasures
 from tfarm.synthesis.structures import Bounds
 from tfarm.synthesis.worst_case import WorstCase
 
@@ -77,7 +80,7 @@ class OptimalCoefficient(NamedTuple):
         Quantity(
             "within one per cent",
             key="within_one_per_cent",
-            help="range with an objective within 1 % of the best, others fixed",
+            help="range within 1 % of the best objective, others fixed; of a slew by the time constant alone",
         ),
     ]
     bounds: Annotated[
@@ -146,20 +149,26 @@ class Design:
     ] = ()
     sensitivities: Annotated[
         tuple[RequirementSlope, ...],
-        Quantity("sensitivities", help="changes of the required quantities, sampled loop, by the model"),
+        Quantity("sensitivities", help="changes of the required quantities of the sampled loop, exact"),
     ] = ()
 
     verification: Annotated[
         Verification | None,
         Quantity("fresh arms", help="requirements on arms drawn from a study or posterior"),
     ] = None
+    norm: Annotated[
+        NormBound | None,
+        Quantity("weighted norm", help="of all weighted functions of the sampled loop as a column"),
+    ] = None
 
     @property
     def is_met(
         self,
-    ) -> Annotated[bool, Quantity("requirements met", help="whether the exact loops meet all requirements")]:
-        """Whether the exact loops meet all requirements on all arms."""
-        return all(each.violation <= 0 for each in self.requirements)
+    ) -> Annotated[
+        bool | None, Quantity("requirements met", help="whether the exact loops meet all; null without any")
+    ]:
+        """Whether the exact loops meet all requirements on all arms; None without requirements."""
+        return all(each.violation <= 0 for each in self.requirements) if self.requirements else None
 
     @property
     def active(
@@ -194,8 +203,13 @@ class Design:
     ) -> Annotated[
         float | None, Quantity("record of the slew", "s", 6, "duration over which the objective is taken")
     ]:
-        """Length of the record of a residual or a cost, for `tfarm simulate --duration`; None of others."""
+        """Length of the record of a quantity of the slew, for `tfarm simulate --duration`; None of others."""
         arm = self.verdict.loop.arm
+        if self.requirements:
+            measures = [requirements_of(each.requirement)[0].measure for each in self.requirements]
+            if any(each.of_slew for each in (MEASURES[NAMES[self.objective]], *measures)):
+                return float(SlewMeasures(arm, arm, self.chain).tasks[0].t[-1])
+            return None
         if self.loop == "continuous":
             return None
         if self.objective == "residual":

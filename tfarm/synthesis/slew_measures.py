@@ -7,14 +7,18 @@ from functools import cached_property
 import numpy as np
 
 from tfarm.arm import AnyLaw, Arm
+from tfarm.assessment.signal_figures import PARTS, LoopRecord, SignalCurve
 from tfarm.case import Case
 from tfarm.dsp import Chain, Scenario, traces
 from tfarm.dsp.results import simulate_modes
 from tfarm.dsp.scenarios import slew_scenario
 from tfarm.dsp.shaping import impulses_of
-from tfarm.dsp.simulation import final_value, settling_time
+from tfarm.dsp.simulation import SETTLING_BAND, Simulation, final_value, settling_time
+from tfarm.loop.time_response import TORQUE
 from tfarm.records import frozen
+from tfarm.schema.quantities import to_dict
 from tfarm.spectrum.table import first_frequency
+from tfarm.synthesis.requirements import MEASURES
 
 TIP = "tip_displacement"
 
@@ -29,13 +33,14 @@ MOST_SAMPLES = 10_000
 class SlewMeasures:
     """The slew of an arm with references of the arm `known`, four records a sample between.
 
-    By `count` modes, or as many as `simulate_modes` takes for enough.
+    By `count` modes, or as many as `simulate_modes` takes for enough; `parts` are those with figures of `tfarm step`.
     """
 
     arm: Arm
     known: Arm
     chain: Chain
     count: int | None = None
+    parts: tuple[str, ...] = PARTS
 
     @cached_property
     def tasks(self) -> list[Scenario]:
@@ -53,8 +58,9 @@ class SlewMeasures:
     def of(self, law: AnyLaw) -> dict[str, float]:
         """Return the figures by name of the measure, inf where the run stops or the tip does not settle.
 
-        Those but the settling time are of the first record.
+        Those but the settling time, and those of parts, are of the first record.
         """
+        names = [name for name, each in MEASURES.items() if each.of_slew]
         case = Case(self.arm, law, self.chain)
         found: dict[str, float] = {}
         impulses = impulses_of(self.known, self.chain, law)
@@ -62,21 +68,44 @@ class SlewMeasures:
             task = plain.through(impulses) if impulses.size > 1 else plain
             run, _ = simulate_modes(case, task, self.count, between=4, outputs=(TIP,))
             if run.stopped is not None:
-                names = ("settling_time_s", "overshoot", "residual_moment", "peak_input")
                 return dict.fromkeys(names, np.inf) | found
             t, y = traces.continuous(run, TIP)
             final = final_value(run.at_samples.t, run.at_samples.signal(TIP))
             travel = final - float(y[0])
             settled = settling_time(t, abs(y - final), abs(travel), task.busy_until)
             if not found:
-                residual = run.residual_moment
+                residuals = [
+                    np.inf if each is None else each for each in (run.residual_moment, run.residual_raw)
+                ]
                 found = {
                     "settling_time_s": np.inf,
                     "overshoot": max(0.0, float((y / final).max()) - 1.0) if travel else 0.0,
-                    "residual_moment": np.inf if residual is None else residual,
+                    "residual_moment": residuals[0],
+                    "residual_raw_moment_rms": residuals[1],
                     "peak_input": float(abs(run.torque).max()),
                 }
+            found |= self._figures(run)
             if settled is not None:
                 found["settling_time_s"] = settled
                 break
+        return found
+
+    def _figures(self, run: Simulation) -> dict[str, float]:
+        """Return the sizes of the figures of `tfarm step` of the parts, inf where one is not defined."""
+        names = dict(zip(PARTS, ("hub_angle", TIP, "root_moment", TORQUE), strict=True))
+        t, _ = traces.continuous(run, TIP)
+        angle = traces.reference_angle(run.scenario, t)
+        reference = {"hub_angle": angle, TIP: self.arm.reach * angle}
+        record = LoopRecord(
+            self.arm, tuple(names.values()), run.scenario.busy_until, t, reference, SETTLING_BAND
+        )
+        found = {}
+        for part in self.parts:
+            if part == "torque":
+                y = traces.held_at(run, run.torque, t)
+            else:
+                y = traces.continuous(run, names[part])[1]
+            for key, value in to_dict(record.figures(names[part], SignalCurve(t, y, 0 * y))).items():
+                if f"{part}.{key}" in MEASURES:
+                    found[f"{part}.{key}"] = np.inf if value is None else abs(value)
         return found

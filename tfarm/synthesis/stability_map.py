@@ -33,7 +33,7 @@ from tfarm.records import frozen
 from tfarm.schema import Column
 from tfarm.spectrum.gains import default_gains
 from tfarm.spectrum.table import first_frequency
-from tfarm.synthesis.good_region import GoodRegion, RequiredGains, good_region
+from tfarm.synthesis.good_region import GoodRegion, good_region
 from tfarm.synthesis.judge import damping_of
 from tfarm.synthesis.models import continuous_model
 from tfarm.synthesis.structures import Entry
@@ -78,7 +78,7 @@ def stable_regions(case: Case) -> StableRegions:
     arm = case.arm
     # at C = 0 with a little damping too
     dampings = (arm.damping,) if arm.damping else (1e-4, 1e-6, 0.0)
-    loops = [sampled_verdict(case.on(arm.having(damping=C))).full for C in dampings]
+    loops = [sampled_verdict(case.on(arm.with_numbers(damping=C))).full for C in dampings]
     ends = np.unique(np.concatenate([ends_of_K1(loop) for loop in loops]))
     ends = ends[ends > 0]
     ends = ends[np.diff(ends, prepend=0.0) > 1e-3 * ends]
@@ -194,13 +194,6 @@ def stability_map(arm: Arm, chain: Chain) -> StabilityMap:
         sampled_region(arm, x, y, chain),
         good_region(arm, x, y, chain),
     )
-
-
-def recommended_gains(arm: Arm, chain: Chain) -> RequiredGains | None:
-    """Return the gains recommended by the map of an arm; None where none are stable."""
-    x = rate_axis(arm)
-    found = good_region(arm, x, moment_axis(arm, x), chain)
-    return None if found is None else found.recommended
 
 
 def least_damping(plane: Plane) -> Real:

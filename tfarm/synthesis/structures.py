@@ -28,6 +28,7 @@ from tfarm.records import frozen
 from tfarm.spectrum import modes as natural_modes
 from tfarm.spectrum.gains import check_gains, rate_unit, turning_inertia
 from tfarm.spectrum.table import first_frequency
+from tfarm.synthesis.anti_windup import with_anti_windup
 from tfarm.synthesis.observer import filter_gain, held_model, integral_feedback, observer_law
 
 Bounds = tuple[float, float]
@@ -37,6 +38,8 @@ Ends = list[tuple[int, int]]
 
 # of the usual size: the unit of a positive coefficient
 LOGARITHMIC = 1e-8
+# of the gains of a law that was found: as many as a person types
+TYPED_DIGITS = 6
 # of a coefficient's usual size, up and down: its first bounds
 REACH = np.exp(4.0)
 
@@ -84,7 +87,7 @@ class Structure:
     """A law with `free` coefficients, and `fixed` ones, which are not searched.
 
     `entries` maps coefficients (n, laws) to the entries; the bounds of the coefficients named in `given` are not to be
-    widened.
+    widened.  Where the input `is_limited` a law with an integrator has anti-windup.
     """
 
     name: str
@@ -92,6 +95,7 @@ class Structure:
     fixed: dict[str, float]
     entries: Callable[[Real], tuple[Entry, ...]]
     given: tuple[str, ...] = ()
+    is_limited: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -142,15 +146,26 @@ class Structure:
         """Return all coefficients by name, the fixed ones first."""
         return self.fixed | dict(zip(self.names, free, strict=True))
 
+    def typed(self, x: Real) -> list[float]:
+        """Return the coefficients at x (n,), gains at the hub to `TYPED_DIGITS`."""
+        found = self.coefficients(x).tolist()
+        if self.name == TWO_GAINS:
+            return [float(f"{value:.{TYPED_DIGITS}g}") for value in found]
+        return found
+
     def record_at(self, x: Real) -> AnyLaw:
         """Return the law at x (n,), as a record."""
-        c = self.coefficients(x)
+        return self.record_of(self.coefficients(x).tolist())
+
+    def record_of(self, c: Sequence[float]) -> AnyLaw:
+        """Return the law of coefficients (n,), as a record."""
         if self.name == TWO_GAINS:
-            return HubFeedback(**self.by_name(c.tolist()))
+            return HubFeedback(**self.by_name(c))
         blocks = {}
-        for signal, num, den in self.entries(c[:, None]):
+        for signal, num, den in self.entries(np.transpose([c])):
             blocks[signal] = tuple(num[:, 0].tolist()), tuple(den[:, 0].tolist())
-        return Law(blocks, name=self.name, references=tuple(blocks))
+        law = Law(blocks, name=self.name, references=tuple(blocks))
+        return with_anti_windup(law) if self.is_limited else law
 
     def at_ends(self, x: Real) -> Ends:
         """Return the ends of the bounds at which coefficients are: nearer than a thousandth of the range of x."""

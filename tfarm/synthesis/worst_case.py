@@ -47,7 +47,7 @@ def vary_arm(arm: Arm, key: str, value: float) -> Arm:
     """
     name = {".".join(place): name for name, place in ADJUSTABLE.items()}.get(key, key)
     if name in ADJUSTABLE:
-        return arm.having(**{name: value})
+        return arm.with_numbers(**{name: value})
     return KeyedArms(arm, (key,), "range").at({key: value})
 
 

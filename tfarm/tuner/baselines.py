@@ -114,7 +114,7 @@ def shaper(loop: Sampled, kind: Shaper, modes: int = 2) -> Real:
 
     By default for those two that a slew excites most.
     """
-    servo = Case(loop.arm, loop.gains.having(MOMENT_GAIN, 0.0), loop.chain)
+    servo = Case(loop.arm, loop.gains.with_number(MOMENT_GAIN, 0.0), loop.chain)
     return impulses_at(loop_modes(servo, loop.plant.count), kind, modes)
 
 
@@ -234,9 +234,12 @@ def tried_loops(case: Case, quantised: Chain | None = None) -> list[NamedLoop]:
     if arm.damping:
         dampings = [0.0, *(float(f"{share * arm.damping:.3g}") for share in (0.1, 10.0))]
     others = {
-        **{f"payload {each:g} kg": arm.having(payload_mass=each) for each in payloads},
-        **{f"hub {share - 1:+.0%}": arm.having(hub_inertia=share * arm.hub_inertia) for share in (0.8, 1.2)},
-        **{f"C = {C:g} s": arm.having(damping=C) for C in dampings},
+        **{f"payload {each:g} kg": arm.with_numbers(payload_mass=each) for each in payloads},
+        **{
+            f"hub {share - 1:+.0%}": arm.with_numbers(hub_inertia=share * arm.hub_inertia)
+            for share in (0.8, 1.2)
+        },
+        **{f"C = {C:g} s": arm.with_numbers(damping=C) for C in dampings},
     }
     cases = {
         "as trained": case,
@@ -289,7 +292,7 @@ def _proven(here: Trial, guard: Guard) -> bool:
 
 def _constant(trial: Trial, K: float) -> Outcome:
     """Return the outcome of a constant gain."""
-    return _outcome(trial.simulator().linear(trial.loop.gains.having(MOMENT_GAIN, K)), trial)
+    return _outcome(trial.simulator().linear(trial.loop.gains.with_number(MOMENT_GAIN, K)), trial)
 
 
 def _outcome(run: Simulation, trial: Trial) -> Outcome:

@@ -133,12 +133,12 @@ class MovingGain:
     @cached_property
     def open(self) -> Real:
         """The matrix with rate feedback alone."""
-        return self.loop.having(MOMENT_GAIN, 0.0).reduced_matrix()
+        return self.loop.with_number(MOMENT_GAIN, 0.0).reduced_matrix()
 
     @cached_property
     def _feedback(self) -> Real:
         """drive sense^T: the change of the matrix by a gain of -1."""
-        return self.open - self.loop.having(MOMENT_GAIN, 1.0).reduced_matrix()
+        return self.open - self.loop.with_number(MOMENT_GAIN, 1.0).reduced_matrix()
 
     @cached_property
     def sense(self) -> Real:
@@ -278,7 +278,7 @@ def find_guard(loop: Sampled, kind: GuardKind, best_constant: float) -> Guard:
     # the least damping with a guard, of a few [s]
     for C in filter(arm.damping.__lt__, np.geomspace(1e-12, 1e-2, 11).tolist()):
         with suppress(ConvergenceError):
-            other = find(_larger(loop.on(arm.having(damping=C), loop.plant.count)), 0.0)
+            other = find(_larger(loop.on(arm.with_numbers(damping=C), loop.plant.count)), 0.0)
             if other and other.is_settled:
                 raise CertificationError(f"{start}; with a damping of C = {C:.1e} s there is one")
     remedy = f"take another {RATE_GAIN}, or a shorter period or delay"
@@ -394,7 +394,7 @@ def upper_modes_are_quiet(loop: Sampled, highest: float) -> bool:
     """Return whether the own decay of the upper half of the modes exceeds the bound on the push of the feedback."""
     plant = loop.plant
     T = loop.chain.sampling.period
-    fed_back = loop.having(MOMENT_GAIN, highest).push
+    fed_back = loop.with_number(MOMENT_GAIN, highest).push
     push = 2 * fed_back * abs(held_amplitude(plant.poles, T))
     upper = (plant.mode > plant.count // 2) & (plant.poles.imag > 0)
     return bool((push[upper] < -plant.poles.real[upper] * T).all())

@@ -112,8 +112,8 @@ class Trial:
         last = loop.pulse.integrals_at + 2
         A, drive = loop.rig.frame
         # the last state is the torque of the last sample: B is 1 there
-        servo = -loop.having("K2", 0.0).matrix()[last]
-        moment = -loop.times(0.0).having("K2", 1.0).matrix()[last]
+        servo = -loop.with_number("K2", 0.0).matrix()[last]
+        moment = -loop.times(0.0).with_number("K2", 1.0).matrix()[last]
         own = loop.rig.sensed.own_moment(loop.chain.sampling)
         own = np.pad(own, (0, drive.size - own.size))
         return kernel.TrialModel(

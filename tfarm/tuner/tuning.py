@@ -148,7 +148,7 @@ class Tuning:
     @property
     def constant(self) -> HubFeedback:
         """The law with the best constant gain."""
-        return self.trial.loop.gains.having(MOMENT_GAIN, self.best_constant.gain)
+        return self.trial.loop.gains.with_number(MOMENT_GAIN, self.best_constant.gain)
 
 
 def usual_plan(arm: Arm, chain: Chain | None = None) -> Plan:
@@ -395,7 +395,7 @@ class TuningResult:
         return self.tuning.saved().model_dump(include={"scales", "W1", "w2"})
 
 
-def controlled_run(
+def simulate_tuner(
     arm: Arm,
     saved: SavedTuner,
     chain: Chain,
