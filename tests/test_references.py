@@ -383,7 +383,7 @@ def test_a_study_has_the_shaped_slew_of_each_arm(tmp_path):
     found = []
     for kind in ("none", "ZVD"):
         study = tfarm.study(LAB, over, [key], law, shaped(kind), out=tmp_path / kind, draws=1, workers=1)
-        truth = tfarm.step(LAB.having(payload_mass=0.1), law, shaped(kind), "slew")
+        truth = tfarm.step(LAB.with_numbers(payload_mass=0.1), law, shaped(kind), "slew")
         assert study.table()[key].tolist() == [truth.sampled.tip.settling_time]
         found.append(truth.busy_until)
     assert found[1] > found[0]

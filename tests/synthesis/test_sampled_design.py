@@ -202,7 +202,7 @@ def test_a_continuous_time_residual_of_a_shaped_slew_has_its_line(capsys, tmp_pa
 @pytest.mark.parametrize("kind", ["ZV", "EI"])
 def test_the_shaper_of_another_arm_is_that_of_the_nominal_one(kind):
     """By the simulation of the other arm under the references of the laboratory arm, whose impulses are longer."""
-    chain, heavy = Chain(reference=ReferenceShaping(shaper=kind)), LAB.having(payload_mass=0.15)
+    chain, heavy = Chain(reference=ReferenceShaping(shaper=kind)), LAB.with_numbers(payload_mass=0.15)
     law = HubFeedback(K1=0.5, K2=0.1, Kp=2.0)
     judges = [make_judge(arm, LAB, chain, "residual", tuple(AT_HUB), 2, 8) for arm in (LAB, heavy)]
     for judge, arm in zip(judges, (LAB, heavy), strict=True):
