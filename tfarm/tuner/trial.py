@@ -215,7 +215,7 @@ def slew_trial(
     length = positive("duration", duration, "a trial lasts a positive number of seconds")
     chain = with_signals(chain, signals)
     must_not_be_algebraic(arm, "hub.inertia", 0.0)
-    task = scenario("slew", arm, chain, length, gains.having(MOMENT_GAIN, 0.0))
+    task = scenario("slew", arm, chain, length, gains.with_number(MOMENT_GAIN, 0.0))
     end = task.busy_until
     require(length >= end, "duration", length, f"a trial lasts at least as long as its slew, {end:g} s")
     loop = sampled_loop(Case(arm, gains, chain), count=count)
