@@ -16,7 +16,7 @@ from scipy.linalg import expm
 
 import tfarm
 from tests.shared import thinned
-from tests.shell import run
+from tests.shell import refused, run
 from tests.synthesis.designs import excess
 from tests.synthesis.held_loop import HeldLoop
 from tests.synthesis.judged import judge_of
@@ -191,6 +191,12 @@ def by_exponentials(arm, law, chain, duration, count):
         z = step @ z
     left = (np.array(moments) - rigid)[t >= chain.slew.rise_time * (1 - 1e-12)]
     return np.sqrt(np.mean(left**2))
+
+
+def test_a_continuous_time_residual_of_a_shaped_slew_has_its_line(capsys, tmp_path):
+    (tmp_path / "chain.toml").write_text('[reference]\nshaper = "ZV"\n')
+    words = ("design", "sasaki2012-lab", "--objective", "residual", "--continuous", "--dsp")
+    assert "without a shaper" in refused(capsys, *words, str(tmp_path / "chain.toml"))
 
 
 @pytest.mark.parametrize("kind", ["ZV", "EI"])

@@ -30,7 +30,7 @@ from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import arm_under_chain
 from tfarm.dsp.results import simulate_modes
-from tfarm.errors import ConvergenceError
+from tfarm.errors import ConvergenceError, require
 from tfarm.loop.edges import LowerBound, most_modes
 from tfarm.loop.loop_margins import lowest
 from tfarm.loop.sampled_verdict import UNDAMPED_MODES, sampled_verdict
@@ -398,6 +398,10 @@ def judge_of(
     arm, chain = arm_under_chain(arm, chain)
     speed = 2 / chain.sampling.period
     if continuous:
+        # an error in a search would be lost
+        own = (chain.reference.profile, chain.reference.shaper, chain.reference.feedforward)
+        remedy = "the continuous-time residual is that of a bang-bang slew without a shaper: leave them out"
+        require(not aim.of_slew or own == ("bang-bang", "none", "rigid"), "reference", " ".join(own), remedy)
         model = continuous_model(arm, signals, modes, 2 * count, speed)
         return Judge(arm, known, chain, aim, model, ())
     model = sampled_model(arm, chain, signals, modes, count)

@@ -29,7 +29,6 @@ from tfarm.dsp.pulse import PulseTransfer
 from tfarm.dsp.scenarios import TRIAL_SLEWS, slew_scenario, trial_weights
 from tfarm.dsp.sensed import sensed_plant
 from tfarm.dsp.shaping import SHARES, impulses_at, impulses_of, modes_alone, modes_under
-from tfarm.errors import require
 from tfarm.loop.continuous import frequency_above_mode, grid
 from tfarm.records import frozen
 from tfarm.reduced.modal import ALGEBRAIC, sensed_model
@@ -526,16 +525,6 @@ class Slews:
         rate and acceleration are states of their own: the acceleration is constant over each half of the slew.
         """
         slew = self.chain.slew
-        reference = self.chain.reference
-        is_plain = (reference.profile, reference.shaper, reference.feedforward) == (
-            "bang-bang",
-            "none",
-            "rigid",
-        )
-        remedy = (
-            "the continuous-time residual is that of a bang-bang slew without a shaper: leave the table out"
-        )
-        require(is_plain, "reference", reference.profile, remedy)
         A, B, C, D = self._closed_loop(entries, 0)
         # the feed-forward and the references by angle, rate and acceleration
         followed = {"hub_angle": (1.0, 0.0, 0.0), "hub_rate": (0.0, 1.0, 0.0)}
