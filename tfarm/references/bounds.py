@@ -71,7 +71,7 @@ class SlewBounds:
         self.sampling = late.sampling
         self.names = tuple(dict.fromkeys((*self.in_z.signals, MOMENT)))
 
-    def over(self, ranges: Ranges, tolerance: float = 0.1, most_boxes: int = 128) -> tuple[Bound, int]:
+    def over(self, ranges: Ranges, tolerance: float = 0.1, most_boxes: int = 64) -> tuple[Bound, int]:
         """Return the box of the largest bound over all arms in these ranges (`check_ranges`), and the number of boxes.
 
         It is halved until its bound exceeds the largest residual of a middle arm by the tolerance at most.
@@ -90,7 +90,7 @@ class SlewBounds:
                 found = self.bound(keyed, box, band)
                 least = max(least, found.least)
                 heappush(boxes, (-found.most, n, box, found))
-            except (CertificationError, ConvergenceError) as error:
+            except (CertificationError, ConvergenceError, np.linalg.LinAlgError) as error:
                 if n >= most_boxes or not box:
                     where = f": {range_words(box)}" if box else ""
                     raise CertificationError(f"{error}{where}") from None

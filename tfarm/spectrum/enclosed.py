@@ -210,6 +210,9 @@ class EnclosedArms:
             if not slope > 0:
                 break
             r = ((value + half * r * r) / slope).upper() * rational(1.1)
+            # a wider disc may reach -1/C
+            if not r < abs(middle) / 10:
+                break
         raise CertificationError(f"no disc around {m:.6g} 1/s has one pole of every arm")
 
     def _residues(self, m: complex, p: Ball) -> list[Ball]:
