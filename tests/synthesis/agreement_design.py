@@ -40,6 +40,7 @@ from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum.gains import rate_unit
 from tfarm.spectrum.table import first_frequency
+from tfarm.synthesis.design import find_near_map
 from tfarm.synthesis.goals import SHARE_OF_SPEED, WEIGHT, Goal, check, measures_of, slowness
 from tfarm.synthesis.judge import LOST, of_laws
 from tfarm.synthesis.models import values_of
@@ -299,7 +300,7 @@ def outcome_of(task, share):
     begun = time.process_time()
     with laws_counted() as counted:
         try:
-            found = task.find([NamedArm(task.arm.name, task.arm, {})], None, "whole")
+            found = find_near_map(task, [NamedArm(task.arm.name, task.arm, {})], None, "whole")
         except ConvergenceError:
             found = None
     cpu = time.process_time() - begun

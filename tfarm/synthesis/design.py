@@ -179,7 +179,7 @@ def design(
         drawn = drawn_arms(arm, study, posterior, fresh)
         worst = search_for.violation_on
     found, named, case = for_the_worst(
-        arms, box or drawn, partial(_find_near_map, search_for), worst, options.tell
+        arms, box or drawn, partial(find_near_map, search_for), worst, options.tell
     )
     conflicts: tuple[str, ...] = ()
     alternatives: tuple[str, ...] = ()
@@ -197,7 +197,7 @@ def design(
     return replace(options, weights=search_for.weights).with_norm(record)
 
 
-def _find_near_map(
+def find_near_map(
     task: RequirementTask, named: Sequence[NamedArm], before: RequiredLaw | None, effort: Effort
 ) -> RequiredLaw:
     """Return the law of a search that begins at the region of the requirements in the map of both gains.
