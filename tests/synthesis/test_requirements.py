@@ -93,10 +93,24 @@ def test_what_is_large_in_a_good_loop_is_not_minimised(capsys):
         (["--minimise", "margin", "--require", "good"], "objective = 'margin': goes without requirements"),
         (["--range", "hub.inertia=1,2", "--range", "hub.inertia=1,3"], "--range = 'hub.inertia': is given twice"),
         (["--save", "."], "--save = '.': is a folder"),
+        (["--minimise", "Ms", "--objective", "torque"], "--minimise = 'torque': Ms is minimised already"),
+        (["--dsp", "nofile"], "--dsp = 'nofile': no such preset"),
     ],
 )
 def test_options_that_exclude_each_other_are_refused_before_any_work(capsys, options, words):
     assert words in refused(capsys, "design", "sasaki2012-lab", *options)
+
+
+def test_requirements_of_a_laws_file_are_refused_as_no_command_reads_them(capsys, tmp_path):
+    law = tmp_path / "law.toml"
+    law.write_text("[law.hub_rate]\ngain = 3.0\n[requirements]\nPM = 50\n")
+    words = "read by no command: write them into the arm's file"
+    assert words in refused(capsys, "margins", "sasaki2012-lab", "--law", str(law))
+
+
+def test_requirements_that_are_repeated_hold_together(capsys):
+    limits = ("--require", "PM>=45", "--require", "phase_margin>=50")
+    assert "PM>=45, PM>=50': two limits" in refused(capsys, "design", "sasaki2012-lab", *limits)
 
 
 def test_requirements_of_a_file_are_read_and_its_errors_name_it(tmp_path):
