@@ -17,7 +17,7 @@ from tfarm.arm.weights import weights_of
 from tfarm.arm.writing import save_law
 from tfarm.assessment.signal_figures import PARTS
 from tfarm.case import Case
-from tfarm.dsp import Actuator, Chain, Converters, Sampling, pulse_transfer
+from tfarm.dsp import Actuator, Chain, Converters, Sampling, Slew, pulse_transfer
 from tfarm.schema.quantities import to_dict
 from tfarm.synthesis.goals import Goal, card_values, check, exact_values
 from tfarm.synthesis.judge import judge_of, slowest_allowed
@@ -99,6 +99,19 @@ def test_what_is_large_in_a_good_loop_is_not_minimised(capsys):
 )
 def test_options_that_exclude_each_other_are_refused_before_any_work(capsys, options, words):
     assert words in refused(capsys, "design", "sasaki2012-lab", *options)
+
+
+def test_a_slew_that_bends_the_arm_beyond_small_deflections_is_refused():
+    """Of a point mass at the tip the root moment of the slew is m L theta_dd L; a simulation stops at 10 EI/L."""
+    link = replace(LAB.link, damping=LAB.link.damping or 1e-4)
+    arm = replace(LAB, link=link, payload=tfarm.Payload(mass=50.0 * link.rhoA * link.length))
+    beam = link.rhoA * link.length**3 / 3
+    moment = (arm.payload.mass * link.length**2 + beam) * 4 * Slew().travel_of(arm.reach) / arm.reach
+    shortest = math.sqrt(moment / (10 * link.EI / link.length))
+    for share, words in ((0.98, "slew.rise_time = .* far beyond small deflections"), (1.02, "weights = 'Q'")):
+        chain = Chain(slew=Slew(rise_time=share * shortest))
+        with pytest.raises(tfarm.ParameterError, match=words):
+            tfarm.design(arm, chain=chain, weights={"Q": 1.0})
 
 
 def test_requirements_of_a_laws_file_are_refused_as_no_command_reads_them(capsys, tmp_path):
