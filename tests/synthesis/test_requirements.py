@@ -269,7 +269,7 @@ def test_a_limit_of_the_input_holds_in_the_slew(good):
 
 
 def test_impossible_limits_say_which_of_them_conflict_and_which_structure_meets_them():
-    found = tfarm.design(LAB, require="PM>=60, time-constant<=0.25", structure="PD")
+    found = tfarm.design(LAB, require="PM>=60, time-constant<=0.25, gain_reduction>=3", structure="PD")
     assert not found.is_met
     assert set(found.conflicts) == {"PM>=60", "time-constant<=0.25"}
     assert max(each.violation for each in found.requirements) > 0.01
