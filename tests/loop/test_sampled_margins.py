@@ -15,7 +15,7 @@ from tests.plausible.arms import draw
 from tests.rigs import some_rig
 from tests.shared import circle_crossings, thinned
 from tests.similar import EITHER
-from tfarm import HubFeedback, Law, modes
+from tfarm import Arm, Hub, HubFeedback, Law, Link, Payload, Section, modes
 from tfarm.arm import as_law
 from tfarm.arrays import MACHINE_EPS
 from tfarm.case import Case
@@ -272,3 +272,22 @@ def test_the_count_at_a_point_is_that_of_the_poles_of_its_own_loop(law, chain, v
 def test_what_is_no_number_of_the_law_is_refused(name):
     with pytest.raises(tfarm.ParameterError, match="law"):
         sampled_map(sampled_loop(Case(LAB, FOUR), count=4), [0.0, 1.0], [0.0, 1.0], (name, "hub_rate"))
+
+
+def test_the_gain_margin_has_the_modes_that_the_verdict_needs_no_more():
+    """A soft rod with a heavy tip: 8 modes are enough for the verdict, and mode 10 is the first with a larger gain."""
+    section = Section.round(diameter=0.0878)
+    link = Link.isotropic(
+        length=1.1, density=1100.0, youngs_modulus=5e6, poissons_ratio=0.49, section=section, damping=2.7e-4
+    )
+    arm = Arm(name="soft", link=link, hub=Hub(inertia=0.048), payload=Payload(mass=6.56, inertia=0.0384))
+    chain = Chain(sampling=Sampling(period=0.0053))
+    law = HubFeedback(K1=6.0, K2=-0.7)
+    found = tfarm.sampled(arm, law, chain)
+    assert found.verdict.loop.plant.count < 10
+    limit = 10 ** (found.curve.gain_margin.value / 20)
+    for share, word in ((0.999, "stable"), (1.001, "unstable")):
+        other = HubFeedback(K1=share * limit * law.K1, K2=share * limit * law.K2)
+        verdict = tfarm.sampled(arm, other, chain).verdict
+        assert verdict.word == word
+    assert verdict.slowest == "mode 10"

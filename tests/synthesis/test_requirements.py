@@ -17,7 +17,7 @@ from tfarm.arm.weights import weights_of
 from tfarm.arm.writing import save_law
 from tfarm.assessment.signal_figures import PARTS
 from tfarm.case import Case
-from tfarm.dsp import Actuator, Chain, Converters, Sampling, pulse_transfer
+from tfarm.dsp import Actuator, Chain, Converters, Sampling, Slew, pulse_transfer
 from tfarm.schema.quantities import to_dict
 from tfarm.synthesis.goals import Goal, card_values, check, exact_values
 from tfarm.synthesis.judge import judge_of, slowest_allowed
@@ -93,10 +93,37 @@ def test_what_is_large_in_a_good_loop_is_not_minimised(capsys):
         (["--minimise", "margin", "--require", "good"], "objective = 'margin': goes without requirements"),
         (["--range", "hub.inertia=1,2", "--range", "hub.inertia=1,3"], "--range = 'hub.inertia': is given twice"),
         (["--save", "."], "--save = '.': is a folder"),
+        (["--minimise", "Ms", "--objective", "torque"], "--minimise = 'torque': Ms is minimised already"),
+        (["--dsp", "nofile"], "--dsp = 'nofile': no such preset"),
     ],
 )
 def test_options_that_exclude_each_other_are_refused_before_any_work(capsys, options, words):
     assert words in refused(capsys, "design", "sasaki2012-lab", *options)
+
+
+def test_a_slew_that_bends_the_arm_beyond_small_deflections_is_refused():
+    """Of a point mass at the tip the root moment of the slew is m L theta_dd L; a simulation stops at 10 EI/L."""
+    link = replace(LAB.link, damping=LAB.link.damping or 1e-4)
+    arm = replace(LAB, link=link, payload=tfarm.Payload(mass=50.0 * link.rhoA * link.length))
+    beam = link.rhoA * link.length**3 / 3
+    moment = (arm.payload.mass * link.length**2 + beam) * 4 * Slew().travel_of(arm.reach) / arm.reach
+    shortest = math.sqrt(moment / (10 * link.EI / link.length))
+    for share, words in ((0.98, "slew.rise_time = .* far beyond small deflections"), (1.02, "weights = 'Q'")):
+        chain = Chain(slew=Slew(rise_time=share * shortest))
+        with pytest.raises(tfarm.ParameterError, match=words):
+            tfarm.design(arm, chain=chain, weights={"Q": 1.0})
+
+
+def test_requirements_of_a_laws_file_are_refused_as_no_command_reads_them(capsys, tmp_path):
+    law = tmp_path / "law.toml"
+    law.write_text("[law.hub_rate]\ngain = 3.0\n[requirements]\nPM = 50\n")
+    words = "read by no command: write them into the arm's file"
+    assert words in refused(capsys, "margins", "sasaki2012-lab", "--law", str(law))
+
+
+def test_requirements_that_are_repeated_hold_together(capsys):
+    limits = ("--require", "PM>=45", "--require", "phase_margin>=50")
+    assert "PM>=45, PM>=50': two limits" in refused(capsys, "design", "sasaki2012-lab", *limits)
 
 
 def test_requirements_of_a_file_are_read_and_its_errors_name_it(tmp_path):
@@ -242,7 +269,7 @@ def test_a_limit_of_the_input_holds_in_the_slew(good):
 
 
 def test_impossible_limits_say_which_of_them_conflict_and_which_structure_meets_them():
-    found = tfarm.design(LAB, require="PM>=60, time-constant<=0.25", structure="PD")
+    found = tfarm.design(LAB, require="PM>=60, time-constant<=0.25, gain_reduction>=3", structure="PD")
     assert not found.is_met
     assert set(found.conflicts) == {"PM>=60", "time-constant<=0.25"}
     assert max(each.violation for each in found.requirements) > 0.01

@@ -45,8 +45,11 @@ def load(name_or_path: AnyFile) -> Arm:
         return arm_of_table(tables)
 
 
-def load_tables(name_or_path: AnyFile) -> ArmFile:
-    """Return the tables of a preset's name or a path; those of a file that was read already as they are."""
+def load_tables(name_or_path: AnyFile, key: str = "arm") -> ArmFile:
+    """Return the tables of a preset's name or a path; those of a file that was read already as they are.
+
+    `key` names it in a refusal.
+    """
     # that of an arm of 64 segments has 15 KB
     most_bytes = 64 * 1024
     if isinstance(name_or_path, ArmFile):
@@ -54,15 +57,15 @@ def load_tables(name_or_path: AnyFile) -> ArmFile:
     is_named = not isinstance(name_or_path, os.PathLike)
     name: Any = name_or_path if is_named else os.fspath(name_or_path)
     is_text = isinstance(name, str) and bool(name.strip()) and "\0" not in name
-    require(is_text, "arm", name, f"give a preset ({', '.join(presets())}) or a path")
+    require(is_text, key, name, f"give a preset ({', '.join(presets())}) or a path")
     if is_named and name in presets():
         name = f"{name}.toml"
         data = (PRESETS / name).read_bytes()
     elif is_named and not _is_path(name):
         remedy = f"no such preset: {did_you_mean(name, presets())}; or give the path of a .toml file"
-        raise ParameterError(key="arm", value=name, remedy=remedy)
+        raise ParameterError(key=key, value=name, remedy=remedy)
     else:
-        data = read_file(name, most_bytes, key="arm", what="a .toml file")
+        data = read_file(name, most_bytes, key=key, what="a .toml file")
     with name_file(name):
         return ArmFile(_table_of(data), name)
 

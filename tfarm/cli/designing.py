@@ -47,8 +47,8 @@ study_command = partial(add_command, "Study")
 def design(
     *,
     arm: ArmName,
-    objective: Annotated[str | None, typer.Option("--minimise", "--objective")] = None,
-    require: Annotated[str | None, typer.Option("--require", metavar="LIST")] = None,
+    objective: Annotated[list[str] | None, typer.Option("--minimise", "--objective", metavar="<str>")] = None,
+    require: Annotated[list[str] | None, typer.Option("--require", metavar="LIST")] = None,
     structure: Annotated[
         str,
         typer.Option("--structure", help="form of the law, such as PD+notch; any other word lists them all"),
@@ -86,7 +86,8 @@ def design(
     objective: quantity that is minimised under requirements: settling, time-constant, overshoot, residual, torque, Ms,
         norm, bandwidth^-1 ...; or one without requirements: damping, margin, sensitivity, delay, residual or cost (of
         the tuner)
-    require: requirements such as "GM>=6, PM>=45, Ms<=2, delay>=1, damping>=2%, torque<=5, settling<=1.5"
+    require: requirements such as "GM>=6, PM>=45, Ms<=2, delay>=1, damping>=2%, torque<=5, settling<=1.5";
+        may be repeated
     study: file of a study: requirements hold on the worst arms of a pool drawn from it
     posterior: posterior of a fit, likewise
     fresh: further arms drawn, on which the law is examined; by default 64
@@ -100,11 +101,14 @@ def design(
     from tfarm.arm.writing import save_law
     from tfarm.synthesis.requirements import load_requirements
 
+    first = objective[0] if objective else None
+    others = ", ".join((objective or [])[1:])
+    refuse({"minimise": others or None}, f"{first} is minimised already: require the others")
     if study is None and posterior is None:
         refuse({"fresh": fresh}, "goes with --study or --posterior")
     subject = load_arm(arm, theory)
     options: dict[str, Any] = {
-        "require": load_requirements(arm) if require is None else require,
+        "require": ", ".join(require) if require else load_requirements(arm),
         "structure": structure,
         "modes": modes,
         "chain": chain(arm),
@@ -116,14 +120,14 @@ def design(
         "weights": dict(weight or ()) or load_weights(arm),
     }
     if trade_off:
-        others = {"range": over, "study": study, "posterior": posterior, "continuous": continuous}
-        refuse(others, "the front is of given arms and both loops")
-        _emit_front(subject, objective, options, save, show)
+        unfit = {"range": over, "study": study, "posterior": posterior, "continuous": continuous}
+        refuse(unfit, "the front is of given arms and both loops")
+        _emit_front(subject, first, options, save, show)
         return
     refuse({name: show.keywords[name] for name in ("csv", "png")}, "goes with --trade-off alone")
     found = tfarm.design(
         subject,
-        objective,
+        first,
         continuous=continuous,
         ranges=dict(over or []),
         study=study,

@@ -226,6 +226,9 @@ def law_of_options(
             gains,
             f"the law is that of {file.name}; leave this out",
         )
+        is_law_alone = "requirements" in file.tables and "link" not in file.tables
+        remedy = f"of {file.name} are read by no command: write them into the arm's file, or after design --require"
+        require(not is_law_alone, "requirements", file.tables.get("requirements"), remedy)
     own = None if gains else load_law(file)
     if own is not None:
         return own, {}
@@ -284,7 +287,7 @@ def chain_of_options(
     """Return the sampled chain of a file, or of the arm's, with the period and the delay that are given instead."""
     from tfarm.arm.chain import load_chain
 
-    chain = load_chain(dsp or file)
+    chain = load_chain(file if dsp is None else load_tables(dsp, "--dsp"))
     sampling = replace(chain.sampling, **without_none({"period": period, "delay_samples": delay_samples}))
     return replace(chain, sampling=sampling, period_from=chain.period_from if period is None else "--period")
 

@@ -255,8 +255,11 @@ class Verdict(OfLoop, LoopVerdict):
 
     @cached_property
     def factors(self) -> list[Window]:
-        """Every stability interval of a factor on the whole law, with the modes of the verdict."""
-        return stable_windows(self.loop, FACTOR)
+        """Every stability interval of a factor on the whole law, with every mode of the range.
+
+        Modes that a verdict needs no more may be those that a larger factor destabilises.
+        """
+        return stable_windows(self.full, FACTOR)
 
     def gain_limits(self, by_phase: tuple[PhaseCrossover, ...]) -> tuple[float, float]:
         """Return the stability interval of that factor, or that of the phase crossovers."""

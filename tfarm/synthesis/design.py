@@ -21,8 +21,8 @@ from tfarm.arm.weights import USUAL_WEIGHTS, Weights, weights_of
 from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import arm_under_chain
-from tfarm.dsp.profiles import motion_of_slew
-from tfarm.dsp.simulate import quantisers
+from tfarm.dsp.scenarios import slew_scenario
+from tfarm.dsp.simulate import largest_moment, quantisers
 from tfarm.dsp.stages import admit
 from tfarm.errors import ConvergenceError, ParameterError, TfarmError
 from tfarm.errors import require as require_that
@@ -343,9 +343,12 @@ class _Options:
         require_that(MEASURES[minimised].sense == "<=", "objective", objective, remedy)
         limits = requirements_of("good" if wanted is None else wanted)
         if MEASURES[minimised].of_slew or any(each.measure.of_slew for each in limits):
-            must_turn(self.arm)
             # a file of a profile is read here, before any search
-            motion_of_slew(self.chain, self.arm.reach, np.arange(2.0))
+            rise = self.chain.slew.rise_time
+            slew = slew_scenario(self.arm, self.chain, rise)
+            is_small = abs(slew.rigid_moment).max() <= largest_moment(self.arm)
+            remedy = "bends the arm far beyond small deflections: give [slew] a longer one, or minimise time-constant"
+            require_that(is_small, "slew.rise_time", rise, remedy)
         arms, form = self.arms_and_form(is_angle_free=True)
         names = {minimised, *(each.name for each in limits)}
         if "peak_input" in names:
