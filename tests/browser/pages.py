@@ -129,7 +129,7 @@ def set_gains(page: Page, law: HubFeedback) -> None:
         "([n, gains]) => live.moves.length > n && Object.keys(gains).every(k => live.now.law[k] === gains[k])",
         arg=[before, {name: law[name] for name in ("K1", "K2", "Kp")}],
     )
-    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    page.wait_for_function("() => live.delayed === live.now.law")
 
 
 def slew_words(arm: Arm, law: HubFeedback, chain: Chain, modes: int) -> dict[str, str]:
@@ -230,6 +230,47 @@ def test_what_is_shown_at_random_gains_is_what_tfarm_prints(browser, folder, nam
             stable[1] += verdict.is_stable
         assert stable[0] >= 2
         assert stable[1] > 0
+
+
+def stable_gains(data: dict[str, Any], number: int) -> Iterator[HubFeedback]:
+    """In stable intervals of the sampled map, half of them near an end."""
+    rng = np.random.default_rng(56)
+    of, K2 = data["sampled_map"], data["axes"]["K2"]
+    columns = [(K1, each) for K1, found in zip(of["K1"], of["intervals"], strict=True) for each in found]
+    for i, place in enumerate(rng.integers(len(columns), size=number)):
+        K1, (low, high) = columns[place]
+        share = (rng.uniform(), rng.uniform() ** 4, 1 - rng.uniform() ** 4)[i % 3]
+        ends = np.clip((low, high), K2["low"], K2["high"])
+        yield HubFeedback(K1=K1, K2=float(ends[0] + share * (ends[1] - ends[0])))
+
+
+# of which the crossovers of L alone have another delay margin, near the border of the region
+NEAR_THE_BORDER = (HubFeedback(K1=1.44164, K2=-0.10315), HubFeedback(K1=3.57159, K2=0.03269))
+
+
+@pytest.mark.parametrize(("name", "more"), [(ARMS[0], NEAR_THE_BORDER), (ARMS[2], ())])
+def test_the_delay_margin_of_the_sampled_loop_is_that_of_tfarm(browser, folder, name, more):
+    """In a move a bound below it where it is more than is good, at rest itself: within a sample poles move otherwise."""
+    arm, chain = tfarm.load(name), load_chain(name)
+    with live_page(browser, folder, name) as opened:
+        page, seen = opened.page, 0
+        for law in (*more, *stable_gains(live_data(page), 32)):
+            card = tfarm.result_card(arm, law, chain).sampled
+            assert card is not None
+            if card.stability != "stable":
+                continue
+            page.evaluate("gains => live.set(gains)", law.by_name)
+            page.wait_for_function("gains => Object.keys(gains).every(k => live.now.law[k] === gains[k])", law.by_name)
+            moving = texts(page, ["z-delay", "z-delay-grade"])
+            page.wait_for_function("() => live.delayed === live.now.law")
+            shown = texts(page, ["z-delay", "z-delay-grade"])
+            delay = float(shown["z-delay"].removeprefix("≥ "))
+            assert delay == pytest.approx(card.delay_margin.value, rel=0.01), law
+            assert shown["z-delay"].startswith("≥") == (delay == 1e3 * 20 * chain.sampling.period), law
+            assert moving["z-delay-grade"] == shown["z-delay-grade"] == card.delay_margin.grade, law
+            assert float(moving["z-delay"].removeprefix("≥ ")) <= delay, law
+            seen += 1
+        assert seen >= 30
 
 
 def seen_turns(rows: list[dict[str, float]], frame: dict[str, list[float]], chart: list[float]) -> Real:
@@ -835,6 +876,7 @@ def test_a_law_of_rational_parts_has_a_slider_for_the_gain_of_each(browser, tmp_
                 page.locator(f"[id='{key}']").fill(repr(value))
                 page.locator(f"[id='{key}']").dispatch_event("change")
             page.wait_for_function("gains => Object.keys(gains).every(k => live.now.law[k] === gains[k])", arg=gains)
+            page.wait_for_function("() => live.delayed === live.now.law")
             now = law.with_factors(factors.tolist())
             both = tfarm.result_card(arm, now, chain)
             card, sampled = both.continuous, both.sampled

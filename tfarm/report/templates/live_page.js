@@ -46,11 +46,21 @@
     const zword = word(z.map(each => each.growth)), of = zword === "unstable" || !dampedZ ? discrete : dampedZ, own = of === discrete ? z : of.poles(law, now?.zown);
     if (!own) return { z, zword, zmargins: null };
     const curve = of.curve(law, own), T = of.period, is_stable = word(own.map(each => each.growth)) === "stable";
+    const late = most => of.delayMargin(law, own, most), margins = () => ({ ...of.margins(law, curve, loop.restOf(law)), delay: delayed(T, ended(late(data.limits.periods[0]))) });
     const scaled = { ...curve, w: curve.w.map(q => q / T), at: w => curve.at(w * T) };
     return {
-      z, zword, zown: of === discrete ? null : own, zmargins: is_stable ? of.margins(law, curve, loop.restOf(law)) : null, zratio: ratio(of.unaliased(own)),
+      z, zword, zown: of === discrete ? null : own, zmargins: is_stable ? margins() : null, late, zratio: ratio(of.unaliased(own)),
       zconstant: T * constant(Math.max(...own.map(each => each.growth))), zcurve: from => curveOf(scaled, ...pixels(), from),
     };
+  }
+
+  // The delay margin of the sampled loop, while gains move as far as it is good; `furtherDelay` goes on at rest
+  const delayed = (T, { samples, is_bound }) => ({ value: T * samples, is_bound });
+  function ended(work) { for (;;) { const { done, value } = work.next(); if (done) return value; } }
+  function* furtherDelay(of) {
+    const { zmargins, late } = of, { longest_delay, period } = data;
+    if (zmargins?.delay.is_bound) zmargins.delay = delayed(period, yield* late(longest_delay / period));
+    return true;
   }
 
   // ---------------------------------------------------------------- the card: tfarm.assessment.card
@@ -62,22 +72,18 @@
     const { limits, period } = data;
     return margins ? {
       up: [decibels(margins.gain[1]), limits.gain], down: [decibels(margins.gain[0]), limits.gain], phase: [Math.abs(margins.phase.value), limits.phase],
-      delay: [1e3 * margins.delay.value, limits.periods.map(x => 1e3 * x * period)], peak: [margins.peak_sensitivity.value, limits.peak],
+      delay: [1e3 * margins.delay.value, limits.periods.map(x => 1e3 * x * period), margins.delay.is_bound], peak: [margins.peak_sensitivity.value, limits.peak],
     } : {};
   }
-  // The delay of the sampled loop by its poles: `margins` follows crossings, of which a delay may make new ones
   function isGood(law) {
-    const is = (margins, but) => !!margins && Object.entries(cellsOf(margins)).every(([name, [value, limit]]) => name === but || grade(value, limit) === "good");
-    if (!is(continuousNumbers(law).margins)) return false;
-    const z = discrete.poles(law);
-    return is(sampledNumbers(law, z).zmargins, "delay") && (dampedZ || discrete).isStableLate(law, data.limits.periods[0]);
+    const is = margins => !!margins && Object.values(cellsOf(margins)).every(([value, limit]) => grade(value, limit) === "good");
+    return is(continuousNumbers(law).margins) && is(sampledNumbers(law, discrete.poles(law)).zmargins);
   }
   function card(of, id, kind, margins) {
     const cells = cellsOf(margins), grades = {};
     for (const name of Object.keys(data.margin_names)) {
-      const [value, limit] = cells[name] || [], found = grades[name] = limit ? grade(value, limit) : "";
-      const is_bound = of === "z" && name === "delay" && value > 1e3 * data.longest_delay; // where tfarm searches no further
-      text(`${of}-${name}`, limit ? is_bound ? `≥ ${general(1e3 * data.longest_delay, 4)}` : infinite(value) : "-");
+      const [value = NaN, limit, is_bound] = cells[name] || [], found = grades[name] = Number.isNaN(value) ? "" : grade(value, limit);
+      text(`${of}-${name}`, found ? is_bound ? `≥ ${infinite(value)}` : infinite(value) : "-");
       text(`${of}-${name}-grade`, found);
       $(`${of}-${name}-grade`).className = `grade ${found}`;
     }
@@ -320,6 +326,9 @@
     keep();
     chord = PRECISE;
     drawAll(true);
+    if (!await inSlices(furtherDelay(of), of)) return;
+    show();
+    window.live.delayed = of.law;
     const work = [...(up ? [["map", "edge", onAxis], ["map", "areas", inPlane]] : []), state.plane === "poles" ? ["poles", "locus", inS] : ["zplane", "discs", inZ], ...(up && discrete ? [["map", "good", inGood]] : [])];
     for (const [name, key, make] of work) {
       const found = of[key] || await inSlices(make(), of);
