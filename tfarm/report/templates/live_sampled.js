@@ -134,7 +134,8 @@ class SampledLoop {
     const z = starts.map((b, i) => add(b, times(away, [Math.cos(2.4 * i), Math.sin(2.4 * i)])));
     const roots = z.map(each => this.based(each));
     const settled = roots.map(() => false), all = [...at, ...others];
-    const waits = () => roots.some((root, i) => !settled[i] && size(root.z) > FAINT);
+    const total = this.sumOfPoles(law, all), isWhole = () => size(minus(roots.reduce((sum, root) => add(sum, root.z), [0, 0]), total)) <= FAINT / 4;
+    const waits = () => roots.some((root, i) => !settled[i] && size(root.z) > FAINT) || !isWhole();
     for (let round = 0; round < 120 && settled.includes(false) && (waits() || (!near && round < 30)); round++) roots.forEach((root, i) => {
       if (settled[i]) return;
       if (size(root.z) < 1e-6) { settled[i] = true; return; } // it decides nothing
@@ -159,8 +160,7 @@ class SampledLoop {
       if (better.base !== root.base && size(better.offset) < 0.5 * size(root.offset)) Object.assign(root, better);
     });
     const bright = roots.every((root, i) => settled[i] || size(root.z) < FAINT);
-    const sum = roots.reduce((total, root) => add(total, root.z), [0, 0]);
-    if (!bright || size(minus(sum, this.sumOfPoles(law, all))) > FAINT / 4) return null;
+    if (!bright || !isWhole()) return null;
     return roots.map(({ z, base, offset }) => ({ z, growth: this.growth(base, offset, z) }));
   }
 
