@@ -1,12 +1,12 @@
 // The live page: gains from sliders, fields, keys, the map and the link; numbers by LiveLoop, SampledLoop and Slew; charts by `paint`.
 "use strict";
 (() => {
-  const $ = id => document.getElementById(id), data = JSON.parse($("live-data").textContent), { names } = data, [across, up] = data.plane || [];
+  const data = JSON.parse($("live-data").textContent), { names } = data, [across, up] = data.plane || [];
   const loop = new LiveLoop(data), discrete = data.sampled_loop && new SampledLoop(data.sampled_loop), slew = data.slew && new Slew(data.slew);
   const damped = data.graded && new LiveLoop({ ...data, ...data.graded }), dampedZ = damped && discrete && new SampledLoop(data.graded.sampled_loop); // that margins are graded with
+  const card = makeCard(data, loop, discrete, slew);
   const REST = 200, UNDOS = 100, PRECISE = 0.25, MOVING = 1, law = { ...data.start }; // ms without a move until everything is drawn in full; states that are kept; pixels of a chord at rest and in a move
   const state = { plane: "poles", loop: "nyquist", vary: up || names[0], shown: "3", ratio: "0" }, usual = { ...state }, past = [], colours = {};
-  const text = (id, words) => { const at = $(id); if (at && at.textContent !== words) at.textContent = words; };
   function dress() { // colours of the screen, light or dark
     const style = getComputedStyle(document.documentElement);
     for (const [name, of] of Object.entries({ ink: "ink", grey: "grey", faint: "line", link: "link", stable: "stable", marginal: "marginal", unstable: "unstable", good: "good", low: "low", poor: "poor" })) colours[name] = style.getPropertyValue(`--${of}`).trim();
@@ -56,100 +56,21 @@
 
   // The delay margin of the sampled loop, while gains move as far as it is good; `furtherDelay` goes on at rest
   const delayed = (T, { samples, is_bound }) => ({ value: T * samples, is_bound });
-  function ended(work) { for (;;) { const { done, value } = work.next(); if (done) return value; } }
   function* furtherDelay(of) {
     const { zmargins, late } = of, { longest_delay, period } = data;
     if (zmargins?.delay.is_bound) zmargins.delay = delayed(period, yield* late(longest_delay / period));
     return true;
   }
 
-  // ---------------------------------------------------------------- the card: tfarm.assessment.card
-
-  const grade = (size, [good, low]) => { const way = good > low ? 1 : -1; return way * size >= way * good ? "good" : way * size >= way * low ? "low" : "poor"; };
-  const infinite = x => Number.isFinite(x) ? general(x, 4) : "no limit", decibels = factor => factor > 1e-9 && factor < 1e9 ? Math.abs(dB(factor)) : Infinity;
-  // The margins of a loop with their limits, as the card has them
-  function cellsOf(margins) {
-    const { limits, period } = data;
-    return margins ? {
-      up: [decibels(margins.gain[1]), limits.gain], down: [decibels(margins.gain[0]), limits.gain], phase: [Math.abs(margins.phase.value), limits.phase],
-      delay: [1e3 * margins.delay.value, limits.periods.map(x => 1e3 * x * period), margins.delay.is_bound], peak: [margins.peak_sensitivity.value, limits.peak],
-    } : {};
-  }
-  function isGood(law) {
-    const is = margins => !!margins && Object.values(cellsOf(margins)).every(([value, limit]) => grade(value, limit) === "good");
-    return is(continuousNumbers(law).margins) && is(sampledNumbers(law, discrete.poles(law)).zmargins);
-  }
-  function card(of, id, kind, margins) {
-    const cells = cellsOf(margins), grades = {};
-    for (const name of Object.keys(data.margin_names)) {
-      const [value = NaN, limit, is_bound] = cells[name] || [], found = grades[name] = Number.isNaN(value) ? "" : grade(value, limit);
-      text(`${of}-${name}`, found ? is_bound ? `≥ ${infinite(value)}` : infinite(value) : "-");
-      text(`${of}-${name}-grade`, found);
-      $(`${of}-${name}-grade`).className = `grade ${found}`;
-    }
-    const worst = ["poor", "low", "good"].find(each => Object.values(grades).includes(each)), own = Object.keys(grades).filter(name => grades[name] === worst);
-    text(id, kind);
-    $(id).className = `pill ${worst || kind}`; // a stable loop has the colour of its grade
-    text(`${of}-limits`, worst && worst !== "good" ? `${worst}: ${own.map(name => data.margin_names[name]).join(", ")}` : "");
-  }
+  const isGood = law => isGoodBy(continuousNumbers(law).margins, data) && isGoodBy(sampledNumbers(law, discrete.poles(law)).zmargins, data);
   function show() {
-    const { law, verdict, why, margins, zmargins, zword } = now;
-    card("s", "verdict", now.grows ? "unstable" : now.stable ? "stable" : "marginal", margins);
-    card("z", "sampled", zword, zmargins);
-    text("why", `${why}.`);
-    text("s-ratio", Number.isFinite(now.ratio) ? general(100 * now.ratio, 4) : "-");
-    text("z-ratio", Number.isFinite(now.zratio) ? general(100 * now.zratio, 4) : "-");
-    text("s-constant", Number.isFinite(now.constant) ? general(now.constant, 4) : "-");
-    text("z-constant", Number.isFinite(now.zconstant) ? general(now.zconstant, 4) : "-");
-    if (slew) { now.figures ||= slew.figures(now.run); const { settled } = now.figures; text("slew-settled", zword === "unstable" ? "unstable" : Number.isFinite(settled) ? general(settled, 5) : `not settled within ${general((now.run.n - 1) * slew.period, 5)} s`); }
+    const { law } = now;
+    card.show(now);
     $("scaled").hidden = !data.default || !names.every(name => law[name] === data.default[name]);
     names.forEach(name => { $(`slider-${name}`).value = place(data.axes[name], law[name]); if (document.activeElement !== $(name)) $(name).value = law[name]; });
-    text("map-note", !law.Kp ? [across, up].map(name => `${name} = ${general(law[name], 4)}`).join(", ") : "The sampled region is known at Kp = 0 and not shown at this Kp; the verdict is that of the gains.");
-    rows("pole-rows", now.poles.slice(0, 5).map(s => [general(s[0], 5), general(s[1], 6), general(hertz(s[1]), 5), dampingRatio(s)]));
-    if ($("more").open) tables();
-  }
-  // What is below the dashboard: the loop as it is, with every margin and crossing
-  function tables() {
-    const { law, z } = now, margins = now.stable ? loop.margins(law, loop.dense(now.poles, law)) : null, gains = data.of_law ? `${data.command_name} --law FILE` : `${data.command_name} --K1 ${law.K1} --K2 ${law.K2} --Kp ${law.Kp}`;
-    for (const id of ["margins", "crossovers", "turnings"]) $(id).hidden = !margins;
-    $("no-margins").hidden = !!margins;
-    text("command", `tfarm margins ${gains}`);
-    if (margins) {
-      text("m-gain", `${general(margins.gain[0], 8)} to ${general(margins.gain[1], 8)}`);
-      for (const name of ["phase", "phase_lag", "phase_lead", "delay", "disk", "peak_sensitivity", "peak_complementary"]) {
-        const { value, at } = margins[name];
-        text(`m-${name}`, general(reliable(value), 6));
-        text(`at-${name}`, at ? `${general(at, 6)} rad/s = ${general(hertz(at), 5)} Hz` : "");
-      }
-      text("whole", whole());
-      rows("gain-crossovers", margins.crossed.map(({ w, angle }) => [general(w, 7), general(hertz(w), 5), general(angle, 6)]));
-      rows("phase-crossovers", margins.crossovers.map(({ w, factor }) => [general(w, 7), general(hertz(w), 5), general(factor, 6)]));
-    }
-    const most = z && Math.max(...z.map(each => each.growth));
-    text("sampled-note", z ? `Dominant pole: ln|z| = ${general(most, 3)} per sample; spectral radius ${general(Math.exp(most), 12)}, of the first ${discrete.modes} mode${discrete.modes > 1 ? "s" : ""}.` : "Not all sampled poles of these gains were found: not determined.");
-    text("sampled-command", discrete ? `tfarm sampled ${gains}` : "");
-    rows("z-rows", (z || []).filter(({ z }) => z[1] > -1e-14).sort((a, b) => b.growth - a.growth).slice(0, 8).map(({ z, growth }) => [general(z[0], 5), general(Math.abs(z[1]) > 1e-14 ? z[1] : 0, 5), general(Math.exp(growth), 7), general(growth, 4)]));
-    if (!slew) return;
-    const { moment, torque, residual } = now.figures, { stopped } = now.run;
-    text("slew-torque", general(torque, 5));
-    text("slew-moment", general(moment, 5));
-    text("slew-residual", residual === null ? "not computed" : general(residual, 5));
-    text("slew-stopped", stopped === null ? "" : `Unstable: simulation stopped at ${general(stopped, 4)} s (deflection limit).`);
-    text("slew-command", `tfarm simulate ${gains} --duration ${general(slew.n * slew.period - slew.period, 6)} --modes ${slew.modes}`);
-  }
-  const reliable = x => Number.isFinite(x) ? +x.toPrecision(9) : x; // to the digits that hold, as `tfarm margins` has it
-  function rows(id, cells) {
-    $(id).replaceChildren(...cells.map(row => {
-      const line = document.createElement("tr");
-      line.append(...row.map(cell => Object.assign(document.createElement("td"), { textContent: cell })));
-      return line;
-    }));
-  }
-  // What the margins up to the band say of the whole infinite-dimensional loop: `tfarm.loop.margins.margins`
-  function whole() {
-    if (loop.kind === "quiet") return "Beyond the frequency range L is no nearer to −1: these margins are those of the whole loop.";
-    if (loop.kind !== "reactive" || !loop.by_sign) return "Of the whole loop they are not known.";
-    return law.K2 ? "Of the whole loop, whose undamped modes have no end, delay and disk margin are 0 and the peaks infinite." : "Of the whole loop, whose undamped modes have no end, the delay margin is 0; the others hold.";
+    const held = law.Kp ? ["no sampled region at this Kp"] : [across, up].map(name => `${name} = ${general(law[name], 4)}`);
+    text("map-note", `${held.join(", ")}.${discrete ? ` Grade good: both loops, sampled one of ${discrete.modes} modes; ends solved for, joined by lines.` : ""}`);
+    if ($("more").open) card.tables(now);
   }
 
   // ---------------------------------------------------------------- charts
@@ -443,6 +364,7 @@
     canvas.addEventListener("pointerdown", event => {
       if (!(drag = taken(event.offsetX, event.offsetY))) return;
       canvas.setPointerCapture(event.pointerId);
+      pointed[name] = null; // what was read stays behind
       drag(event.offsetX, event.offsetY);
     });
     canvas.addEventListener("touchstart", event => { if (drag) event.preventDefault(); }, { passive: false }); // else a finger scrolls
@@ -543,7 +465,7 @@
   for (const [id, act] of Object.entries({ reset: () => set({ ...data.start, ...usual }), recommend: () => set({ ...data.recommended }), undo, copy, save })) $(id)?.addEventListener("click", act);
   for (const id of ["plane", "loop"]) $(id).addEventListener("click", event => { if (event.target.value) set({ [id]: event.target.value }); });
   for (const id of ["vary", "shown", "ratio"]) $(id).addEventListener("change", event => { now.locus = now.discs = null; set({ [id]: event.target.value }); });
-  $("more").addEventListener("toggle", () => { if ($("more").open) { tables(); draw("sensor"); } });
+  $("more").addEventListener("toggle", () => { if ($("more").open) { card.tables(now); draw("sensor"); } });
   addEventListener("hashchange", () => { if (location.hash.slice(1) !== written) { written = location.hash.slice(1); set(linked()); } });
   addEventListener("resize", () => { set({}); draw("sensor"); });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { dress(); set({}); draw("sensor"); });
