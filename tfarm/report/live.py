@@ -101,7 +101,7 @@ def write_assets(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     scripts = "".join(
         (TEMPLATES / f"live_{name}.js").read_text(encoding="utf-8")
-        for name in ("loop", "sampled", "good", "locus", "sets", "chart", "player", "sensor", "page")
+        for name in ("loop", "sampled", "good", "locus", "sets", "chart", "card", "player", "sensor", "page")
     )
     write_text(folder / SCRIPT, f"(() => {{\n{scripts}}})();\n")
 

@@ -1,12 +1,12 @@
 // The live page: gains from sliders, fields, keys, the map and the link; numbers by LiveLoop, SampledLoop and Slew; charts by `paint`.
 "use strict";
 (() => {
-  const $ = id => document.getElementById(id), data = JSON.parse($("live-data").textContent), { names } = data, [across, up] = data.plane || [];
+  const data = JSON.parse($("live-data").textContent), { names } = data, [across, up] = data.plane || [];
   const loop = new LiveLoop(data), discrete = data.sampled_loop && new SampledLoop(data.sampled_loop), slew = data.slew && new Slew(data.slew);
   const damped = data.graded && new LiveLoop({ ...data, ...data.graded }), dampedZ = damped && discrete && new SampledLoop(data.graded.sampled_loop); // that margins are graded with
+  const card = makeCard(data, loop, discrete, slew);
   const REST = 200, UNDOS = 100, PRECISE = 0.25, MOVING = 1, law = { ...data.start }; // ms without a move until everything is drawn in full; states that are kept; pixels of a chord at rest and in a move
   const state = { plane: "poles", loop: "nyquist", vary: up || names[0], shown: "3", ratio: "0" }, usual = { ...state }, past = [], colours = {};
-  const text = (id, words) => { const at = $(id); if (at && at.textContent !== words) at.textContent = words; };
   function dress() { // colours of the screen, light or dark
     const style = getComputedStyle(document.documentElement);
     for (const [name, of] of Object.entries({ ink: "ink", grey: "grey", faint: "line", link: "link", stable: "stable", marginal: "marginal", unstable: "unstable", good: "good", low: "low", poor: "poor" })) colours[name] = style.getPropertyValue(`--${of}`).trim();
@@ -46,104 +46,31 @@
     const zword = word(z.map(each => each.growth)), of = zword === "unstable" || !dampedZ ? discrete : dampedZ, own = of === discrete ? z : of.poles(law, now?.zown);
     if (!own) return { z, zword, zmargins: null };
     const curve = of.curve(law, own), T = of.period, is_stable = word(own.map(each => each.growth)) === "stable";
+    const late = most => of.delayMargin(law, own, most), margins = () => ({ ...of.margins(law, curve, loop.restOf(law)), delay: delayed(T, ended(late(data.limits.periods[0]))) });
     const scaled = { ...curve, w: curve.w.map(q => q / T), at: w => curve.at(w * T) };
     return {
-      z, zword, zown: of === discrete ? null : own, zmargins: is_stable ? of.margins(law, curve, loop.restOf(law)) : null, zratio: ratio(of.unaliased(own)),
+      z, zword, zown: of === discrete ? null : own, zmargins: is_stable ? margins() : null, late, zratio: ratio(of.unaliased(own)),
       zconstant: T * constant(Math.max(...own.map(each => each.growth))), zcurve: from => curveOf(scaled, ...pixels(), from),
     };
   }
 
-  // ---------------------------------------------------------------- the card: tfarm.assessment.card
+  // The delay margin of the sampled loop, while gains move as far as it is good; `furtherDelay` goes on at rest
+  const delayed = (T, { samples, is_bound }) => ({ value: T * samples, is_bound });
+  function* furtherDelay(of) {
+    const { zmargins, late } = of, { longest_delay, period } = data;
+    if (zmargins?.delay.is_bound) zmargins.delay = delayed(period, yield* late(longest_delay / period));
+    return true;
+  }
 
-  const grade = (size, [good, low]) => { const way = good > low ? 1 : -1; return way * size >= way * good ? "good" : way * size >= way * low ? "low" : "poor"; };
-  const infinite = x => Number.isFinite(x) ? general(x, 4) : "no limit", decibels = factor => factor > 1e-9 && factor < 1e9 ? Math.abs(dB(factor)) : Infinity;
-  // The margins of a loop with their limits, as the card has them
-  function cellsOf(margins) {
-    const { limits, period } = data;
-    return margins ? {
-      up: [decibels(margins.gain[1]), limits.gain], down: [decibels(margins.gain[0]), limits.gain], phase: [Math.abs(margins.phase.value), limits.phase],
-      delay: [1e3 * margins.delay.value, limits.periods.map(x => 1e3 * x * period)], peak: [margins.peak_sensitivity.value, limits.peak],
-    } : {};
-  }
-  // The delay of the sampled loop by its poles: `margins` follows crossings, of which a delay may make new ones
-  function isGood(law) {
-    const is = (margins, but) => !!margins && Object.entries(cellsOf(margins)).every(([name, [value, limit]]) => name === but || grade(value, limit) === "good");
-    if (!is(continuousNumbers(law).margins)) return false;
-    const z = discrete.poles(law);
-    return is(sampledNumbers(law, z).zmargins, "delay") && (dampedZ || discrete).isStableLate(law, data.limits.periods[0]);
-  }
-  function card(of, id, kind, margins) {
-    const cells = cellsOf(margins), grades = {};
-    for (const name of Object.keys(data.margin_names)) {
-      const [value, limit] = cells[name] || [], found = grades[name] = limit ? grade(value, limit) : "";
-      const is_bound = of === "z" && name === "delay" && value > 1e3 * data.longest_delay; // where tfarm searches no further
-      text(`${of}-${name}`, limit ? is_bound ? `≥ ${general(1e3 * data.longest_delay, 4)}` : infinite(value) : "-");
-      text(`${of}-${name}-grade`, found);
-      $(`${of}-${name}-grade`).className = `grade ${found}`;
-    }
-    const worst = ["poor", "low", "good"].find(each => Object.values(grades).includes(each)), own = Object.keys(grades).filter(name => grades[name] === worst);
-    text(id, kind);
-    $(id).className = `pill ${worst || kind}`; // a stable loop has the colour of its grade
-    text(`${of}-limits`, worst && worst !== "good" ? `${worst}: ${own.map(name => data.margin_names[name]).join(", ")}` : "");
-  }
+  const isGood = law => isGoodBy(continuousNumbers(law).margins, data) && isGoodBy(sampledNumbers(law, discrete.poles(law)).zmargins, data);
   function show() {
-    const { law, verdict, why, margins, zmargins, zword } = now;
-    card("s", "verdict", now.grows ? "unstable" : now.stable ? "stable" : "marginal", margins);
-    card("z", "sampled", zword, zmargins);
-    text("why", `${why}.`);
-    text("s-ratio", Number.isFinite(now.ratio) ? general(100 * now.ratio, 4) : "-");
-    text("z-ratio", Number.isFinite(now.zratio) ? general(100 * now.zratio, 4) : "-");
-    text("s-constant", Number.isFinite(now.constant) ? general(now.constant, 4) : "-");
-    text("z-constant", Number.isFinite(now.zconstant) ? general(now.zconstant, 4) : "-");
-    if (slew) { now.figures ||= slew.figures(now.run); const { settled } = now.figures; text("slew-settled", zword === "unstable" ? "unstable" : Number.isFinite(settled) ? general(settled, 5) : `not settled within ${general((now.run.n - 1) * slew.period, 5)} s`); }
+    const { law } = now;
+    card.show(now);
     $("scaled").hidden = !data.default || !names.every(name => law[name] === data.default[name]);
     names.forEach(name => { $(`slider-${name}`).value = place(data.axes[name], law[name]); if (document.activeElement !== $(name)) $(name).value = law[name]; });
-    text("map-note", !law.Kp ? [across, up].map(name => `${name} = ${general(law[name], 4)}`).join(", ") : "The sampled region is known at Kp = 0 and not shown at this Kp; the verdict is that of the gains.");
-    rows("pole-rows", now.poles.slice(0, 5).map(s => [general(s[0], 5), general(s[1], 6), general(hertz(s[1]), 5), dampingRatio(s)]));
-    if ($("more").open) tables();
-  }
-  // What is below the dashboard: the loop as it is, with every margin and crossing
-  function tables() {
-    const { law, z } = now, margins = now.stable ? loop.margins(law, loop.dense(now.poles, law)) : null, gains = data.of_law ? `${data.command_name} --law FILE` : `${data.command_name} --K1 ${law.K1} --K2 ${law.K2} --Kp ${law.Kp}`;
-    for (const id of ["margins", "crossovers", "turnings"]) $(id).hidden = !margins;
-    $("no-margins").hidden = !!margins;
-    text("command", `tfarm margins ${gains}`);
-    if (margins) {
-      text("m-gain", `${general(margins.gain[0], 8)} to ${general(margins.gain[1], 8)}`);
-      for (const name of ["phase", "phase_lag", "phase_lead", "delay", "disk", "peak_sensitivity", "peak_complementary"]) {
-        const { value, at } = margins[name];
-        text(`m-${name}`, general(reliable(value), 6));
-        text(`at-${name}`, at ? `${general(at, 6)} rad/s = ${general(hertz(at), 5)} Hz` : "");
-      }
-      text("whole", whole());
-      rows("gain-crossovers", margins.crossed.map(({ w, angle }) => [general(w, 7), general(hertz(w), 5), general(angle, 6)]));
-      rows("phase-crossovers", margins.crossovers.map(({ w, factor }) => [general(w, 7), general(hertz(w), 5), general(factor, 6)]));
-    }
-    const most = z && Math.max(...z.map(each => each.growth));
-    text("sampled-note", z ? `Dominant pole: ln|z| = ${general(most, 3)} per sample; spectral radius ${general(Math.exp(most), 12)}, of the first ${discrete.modes} mode${discrete.modes > 1 ? "s" : ""}.` : "Not all sampled poles of these gains were found: not determined.");
-    text("sampled-command", discrete ? `tfarm sampled ${gains}` : "");
-    rows("z-rows", (z || []).filter(({ z }) => z[1] > -1e-14).sort((a, b) => b.growth - a.growth).slice(0, 8).map(({ z, growth }) => [general(z[0], 5), general(Math.abs(z[1]) > 1e-14 ? z[1] : 0, 5), general(Math.exp(growth), 7), general(growth, 4)]));
-    if (!slew) return;
-    const { moment, torque, residual } = now.figures, { stopped } = now.run;
-    text("slew-torque", general(torque, 5));
-    text("slew-moment", general(moment, 5));
-    text("slew-residual", residual === null ? "not computed" : general(residual, 5));
-    text("slew-stopped", stopped === null ? "" : `Unstable: simulation stopped at ${general(stopped, 4)} s (deflection limit).`);
-    text("slew-command", `tfarm simulate ${gains} --duration ${general(slew.n * slew.period - slew.period, 6)} --modes ${slew.modes}`);
-  }
-  const reliable = x => Number.isFinite(x) ? +x.toPrecision(9) : x; // to the digits that hold, as `tfarm margins` has it
-  function rows(id, cells) {
-    $(id).replaceChildren(...cells.map(row => {
-      const line = document.createElement("tr");
-      line.append(...row.map(cell => Object.assign(document.createElement("td"), { textContent: cell })));
-      return line;
-    }));
-  }
-  // What the margins up to the band say of the whole infinite-dimensional loop: `tfarm.loop.margins.margins`
-  function whole() {
-    if (loop.kind === "quiet") return "Beyond the frequency range L is no nearer to −1: these margins are those of the whole loop.";
-    if (loop.kind !== "reactive" || !loop.by_sign) return "Of the whole loop they are not known.";
-    return law.K2 ? "Of the whole loop, whose undamped modes have no end, delay and disk margin are 0 and the peaks infinite." : "Of the whole loop, whose undamped modes have no end, the delay margin is 0; the others hold.";
+    const held = law.Kp ? ["no sampled region at this Kp"] : [across, up].map(name => `${name} = ${general(law[name], 4)}`);
+    text("map-note", `${held.join(", ")}.${discrete ? ` Grade good: both loops, sampled one of ${discrete.modes} modes; ends solved for, joined by lines.` : ""}`);
+    if ($("more").open) card.tables(now);
   }
 
   // ---------------------------------------------------------------- charts
@@ -320,6 +247,9 @@
     keep();
     chord = PRECISE;
     drawAll(true);
+    if (!await inSlices(furtherDelay(of), of)) return;
+    show();
+    window.live.delayed = of.law;
     const work = [...(up ? [["map", "edge", onAxis], ["map", "areas", inPlane]] : []), state.plane === "poles" ? ["poles", "locus", inS] : ["zplane", "discs", inZ], ...(up && discrete ? [["map", "good", inGood]] : [])];
     for (const [name, key, make] of work) {
       const found = of[key] || await inSlices(make(), of);
@@ -434,6 +364,7 @@
     canvas.addEventListener("pointerdown", event => {
       if (!(drag = taken(event.offsetX, event.offsetY))) return;
       canvas.setPointerCapture(event.pointerId);
+      pointed[name] = null; // what was read stays behind
       drag(event.offsetX, event.offsetY);
     });
     canvas.addEventListener("touchstart", event => { if (drag) event.preventDefault(); }, { passive: false }); // else a finger scrolls
@@ -534,7 +465,7 @@
   for (const [id, act] of Object.entries({ reset: () => set({ ...data.start, ...usual }), recommend: () => set({ ...data.recommended }), undo, copy, save })) $(id)?.addEventListener("click", act);
   for (const id of ["plane", "loop"]) $(id).addEventListener("click", event => { if (event.target.value) set({ [id]: event.target.value }); });
   for (const id of ["vary", "shown", "ratio"]) $(id).addEventListener("change", event => { now.locus = now.discs = null; set({ [id]: event.target.value }); });
-  $("more").addEventListener("toggle", () => { if ($("more").open) { tables(); draw("sensor"); } });
+  $("more").addEventListener("toggle", () => { if ($("more").open) { card.tables(now); draw("sensor"); } });
   addEventListener("hashchange", () => { if (location.hash.slice(1) !== written) { written = location.hash.slice(1); set(linked()); } });
   addEventListener("resize", () => { set({}); draw("sensor"); });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { dress(); set({}); draw("sensor"); });

@@ -1,5 +1,6 @@
 // The sampled loop of any gains, and its slew, from the poles and residues of the modal plant: tfarm.dsp.plant, loop, simulate.
 "use strict";
+const MOST_STEPS = 2000, ENTERS = [0.05, 0.02]; // of a search of the delay; where a pole begins that came from z = 0
 const FAINT = 0.2; // a pole nearer to z = 0 decides nothing, and where many gather there none is distinct
 const doubles = packed => new Float64Array(Uint8Array.from(atob(packed), c => c.charCodeAt(0)).buffer);
 const exp = a => times(Math.exp(a[0]), [Math.cos(a[1]), Math.sin(a[1])]), pair = (v, i) => [v[2 * i], v[2 * i + 1]];
@@ -33,13 +34,26 @@ class SampledLoop {
     const total = this.delay + this.fraction + samples;
     return Object.create(this).hold(Math.floor(total), total % 1);
   }
-  // Whether each of some further delays up to `samples` leaves the loop stable: the steps of tfarm.loop.edges
-  isStableLate(law, samples) {
-    let near = null;
-    return [...Array(Math.ceil(10 * samples)).keys()].every(k => {
-      near = this.later(Math.min((k + 1) / 10, samples)).poles(law, near);
-      return near && near.every(({ growth }) => growth < 0);
-    });
+  // The least further delay [samples] that destabilises a stable loop of these poles: tfarm.loop.edges.delay_margin.
+  // `is_bound` where none up to `most` does; NaN where its poles are not determined.  It yields before each step
+  *delayMargin(law, poles, most) {
+    const worst = poles => Math.max(...poles.map(({ growth }) => growth)), step = this.delayStep(law), end = Math.min(most, MOST_STEPS * step);
+    for (let low = 0, near = poles, k = 1; low < end; k++) {
+      yield;
+      const high = Math.min(k * step, end), later = this.later(high).poles(law, near, 1e-5);
+      if (!later) return { samples: NaN };
+      const growth = more => { const found = this.later(more).poles(law, near, 1e-5); return found ? worst(found) : NaN; };
+      if (worst(later) >= 0) return { samples: zeroOf(growth, low, worst(near), high, worst(later)) };
+      [low, near] = [high, later];
+    }
+    return { samples: end, is_bound: true };
+  }
+  // A tenth of a sample, or the twelfth of a turn of the fastest mode that the feedback may destabilise
+  delayStep(law) {
+    const T = this.period, at = this.p.map(([, y]) => minus(exp([0, y * T]), [1, 0]));
+    const push = i => this.columns.reduce((sum, { name, row, g, zeros, poles }) => sum + size(times(law[name] * g, mul(this.filtered({ zeros, poles }, at[i])[0], pair(this.residues[row], i)))), 0);
+    const fastest = this.p.reduce((most, p, i) => p[1] > 0 && 4 * push(i) * size(held(p, T)) > -p[0] * T ? Math.max(most, p[1] * T) : most, Math.PI / 4);
+    return Math.min(0.1, 2 * Math.PI / fastest / 12);
   }
 
   // What the law makes of each output: residues and static parts of their weighted sum, and apart those times a block of the law with
@@ -106,20 +120,22 @@ class SampledLoop {
 
   // Every closed-loop pole with ln|z|, z = 1 of a free angle left out, `near` being those of gains close by; null if not all are had
   poles(law, near = null, exact = 1e-13) {
-    return (near && this.iterated(law, near, 0, exact)) || this.iterated(law, null, 0.02, exact) || this.iterated(law, null, 0.3, exact);
+    return (near && (this.iterated(law, near, 0, exact) || this.iterated(law, near, 0.02, exact))) || this.iterated(law, null, 0.02, exact) || this.iterated(law, null, 0.3, exact);
   }
 
-  // Aberth's iteration (1973) on F times its poles, from `near` or from all poles of the plant moved by `away`
+  // Aberth's iteration (1973) on F times its poles, from `near` or from all poles of the plant, moved by `away`
   iterated(law, near, away, exact) {
     const last = this.b.length - 1, ones = this.ones ?? Math.max(0, this.states - (law.Kp ? 0 : 1)), weights = this.weighted(law);
     const at = this.b.map((b, i) => ({ b, n: i === last ? ones : 1 })).filter(each => each.n > 0);
     const others = [{ b: [0, 0], n: this.delay + 1 }, ...weights.flatMap(each => each.poles.map(pole => ({ b: add([1, 0], pole), n: 1 }))).filter(({ b }) => size(b))];
-    const starts = [...at, ...others].flatMap(({ b, n }) => Array(n).fill(b)).map((b, i) => add(b, times(away, [Math.cos(2.4 * i), Math.sin(2.4 * i)])));
-    if (near && near.length !== starts.length) return null;
-    const z = near ? near.map(each => each.z) : starts;
+    const plant = [...at, ...others].flatMap(({ b, n }) => Array(n).fill(b)), gone = near ? plant.length - near.length : 0;
+    if (gone < 0 || gone > 1) return null;
+    const starts = near ? [...near.map(each => each.z), ...Array(gone).fill(ENTERS)] : plant; // a pole more where the delay is a sample more
+    const z = starts.map((b, i) => add(b, times(away, [Math.cos(2.4 * i), Math.sin(2.4 * i)])));
     const roots = z.map(each => this.based(each));
     const settled = roots.map(() => false), all = [...at, ...others];
-    const waits = () => roots.some((root, i) => !settled[i] && size(root.z) > FAINT);
+    const total = this.sumOfPoles(law, all), isWhole = () => size(minus(roots.reduce((sum, root) => add(sum, root.z), [0, 0]), total)) <= FAINT / 4;
+    const waits = () => roots.some((root, i) => !settled[i] && size(root.z) > FAINT) || !isWhole();
     for (let round = 0; round < 120 && settled.includes(false) && (waits() || (!near && round < 30)); round++) roots.forEach((root, i) => {
       if (settled[i]) return;
       if (size(root.z) < 1e-6) { settled[i] = true; return; } // it decides nothing
@@ -144,8 +160,7 @@ class SampledLoop {
       if (better.base !== root.base && size(better.offset) < 0.5 * size(root.offset)) Object.assign(root, better);
     });
     const bright = roots.every((root, i) => settled[i] || size(root.z) < FAINT);
-    const sum = roots.reduce((total, root) => add(total, root.z), [0, 0]);
-    if (!bright || size(minus(sum, this.sumOfPoles(law, all))) > FAINT / 4) return null;
+    if (!bright || !isWhole()) return null;
     return roots.map(({ z, base, offset }) => ({ z, growth: this.growth(base, offset, z) }));
   }
 
@@ -188,33 +203,11 @@ class SampledLoop {
   // Margins, w in rad/s; `rest` is the factor at which a pole at z = 1 ends stability
   margins(law, curve, rest) {
     const found = marginsOn(curve, false), [, , last] = curve.at(Math.PI), all = [...found.factors.map(row => row.factor), -1 / last, rest], T = this.period;
-    const lag = row => (row.angle + 360) % 360 * Math.PI / 180 / row.w, near = [...found.crossed].sort((a, b) => lag(a) - lag(b)), { w, N } = curve;
-    const L = i => size(pair(N, i)), tops = [...w.keys()].slice(1, -1).filter(i => L(i) > 0.3 && L(i) < 1 && L(i) >= L(i - 1) && L(i) > L(i + 1)); // a fraction of a sample may lift one over 1
-    const at = row => ({ ...row, at: row.at / T }), soon = row => !near.length || lag(row) < 1.3 * lag(near[0]) + 0.3;
-    const peaks = tops.map(i => ({ w: w[i], angle: degrees(times(-1, pair(N, i))) })).filter(soon).sort((a, b) => lag(a) - lag(b)).slice(0, 3);
-    const delays = [...near.slice(0, 3).filter(soon).map(row => this.delayAt(law, row.w, lag(row), 0)), ...peaks.flatMap(row => [-1, 1].map(side => this.delayAt(law, row.w, lag(row), side)))];
+    const at = row => ({ ...row, at: row.at / T });
     return {
-      ...found, phase: at(found.phase), peak_sensitivity: at(found.peak_sensitivity), delay: { value: T * Math.min(Infinity, ...delays) },
+      ...found, phase: at(found.phase), peak_sensitivity: at(found.peak_sensitivity),
       gain: [Math.max(0, ...all.filter(t => t >= 0 && t < 1)), Math.min(Infinity, ...all.filter(t => t > 1))],
     };
-  }
-  // The further delay [samples] at which the crossing of |L| = 1 near `top` is at -1, on one `side` of it where that is a peak (else 0);
-  // a fraction of a sample moves the crossing too.  Infinite where the peak does not cross
-  delayAt(law, top, from, side) {
-    let more = from, q = top, off = 0;
-    for (let k = 0; k < 12; k++) {
-      const later = this.later(more), weights = later.weighted(law);
-      const f = q => { const [, , x, y] = later.both(q, weights); return Math.log(x * x + y * y); };
-      for (let h = (k ? 1e-5 : 1e-3) * q, j = 0; j < 10; j++, h *= 4) {
-        const [a, b] = side ? [side < 0 ? top - h : top, side < 0 ? top : Math.min(top + h, Math.PI)] : [q - h, Math.min(q + h, Math.PI)], [fa, fb] = [f(a), f(b)];
-        if (fa * fb < 0) { q = zeroOf(f, a, fa, b, fb); break; }
-      }
-      const [, , x, y] = later.both(q, weights), step = Math.atan2(-y, -x) / q;
-      more += step + (more + step < 0 ? 2 * Math.PI / q : 0);
-      off = Math.abs(f(q));
-      if (Math.abs(step) < 1e-8) break;
-    }
-    return side && off > 1e-6 ? Infinity : more;
   }
 
   // The poles in s, each at the frequency nearest to that of the mode whose pole in z is nearest: tfarm.assessment.card

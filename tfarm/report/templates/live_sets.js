@@ -4,6 +4,9 @@ const dB = x => 20 * Math.log10(x), hertz = w => w / (2 * Math.PI), clip = (x, a
 const RATIOS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5], DISC_RATIOS = [0.02, 0.1, 0.3, 0.6], CROWDED = 0.05; // of the height: lower rays lie on each other
 const dampingRatio = ([re, im]) => im ? general(-re / Math.sqrt(re * re + im * im), 4) : "";
 
+// What a generator returns, run without a pause
+function ended(work) { for (;;) { const { done, value } = work.next(); if (done) return value; } }
+
 // Where a gain is along its axis, 0 to 1, and back: logarithmic away from 0
 const stretched = ({ linear }, x) => linear === null ? x : Math.sign(x) * Math.log1p(Math.abs(x) / linear);
 const place = (axis, x) => (stretched(axis, x) - stretched(axis, axis.low)) / (stretched(axis, axis.high) - stretched(axis, axis.low));
