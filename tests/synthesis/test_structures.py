@@ -26,7 +26,7 @@ from tfarm.schema import text
 from tfarm.synthesis import judge, search
 from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import LOST, RESERVE, TOO_SLOW
-from tfarm.synthesis.models import in_blocks, squares
+from tfarm.synthesis.slew_models import in_blocks, squares
 from tfarm.synthesis.structures import STRUCTURES, structure_of
 from tfarm.tuner.trial import Cost, slew_trial
 from tfarm.tuner.tuning import usual_plan

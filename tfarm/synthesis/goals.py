@@ -96,11 +96,11 @@ class Goal:
         Margins of the sampled loop are first: most laws are above their limit by these, whatever their speed.
         """
         scores = slowness(judge, entries) + self._least(judge)
-        for stage in (self._margins, self._speeds, self._continuous, self._delays):
+        for stage in (self._margins, self._speeds, self._continuous):
             left = np.flatnonzero(scores <= limits)
             if left.size:
                 scores[left] += stage(judge, of_laws(entries, left))
-        return scores
+        return self._with_delays(judge, entries, scores, limits)
 
     def _least(self, judge: Any) -> float:
         """Return a lower bound of the logarithm of the value."""
@@ -125,9 +125,19 @@ class Goal:
         """Return the penalties of the continuous-time loop (laws,)."""
         return self._penalty(self.loop_violations(1, measures_of(judge, entries, judge.also[0])))
 
-    def _delays(self, judge: Any, entries: Sequence[Entry]) -> Real:
-        """Return the penalties of unstable loops with the delays required (laws,)."""
-        return self._penalty(self._delay_violations(judge, entries))
+    def _with_delays(self, judge: Any, entries: Sequence[Entry], scores: Real, limits: Real) -> Real:
+        """Return the scores with the penalty of the fastest growth under the delays required (laws,).
+
+        The longest delay is first, by which most laws are above their limit.
+        """
+        found = scores.copy()
+        for model in reversed(judge.delayed):
+            left = np.flatnonzero(found <= limits)
+            if left.size:
+                growth = measures_of(judge, of_laws(entries, left), model).growth
+                penalty = self._penalty([growth / GROWTH_OF_DELAY])
+                found[left] = np.maximum(found[left], scores[left] + penalty)
+        return found
 
     def value(self, judge: Any, sampled: LoopMeasures) -> Real:
         """Return the quantity that is minimised, in place of one of the slew the dominant time constant (laws,)."""
@@ -149,19 +159,15 @@ class Goal:
                 found.append(each.violations(loop.of(each.name)) + shift)
         return found
 
-    def _delay_violations(self, judge: Any, entries: Sequence[Entry]) -> list[Real]:
+    def delay_violations(self, judge: Any, entries: Sequence[Entry]) -> list[Real]:
         """Return the growth (laws,) with the delays: the loop function leaves out that signals are read late."""
         growth = [measures_of(judge, entries, model).growth for model in judge.delayed]
         return [np.max(growth, axis=0) / GROWTH_OF_DELAY] if growth else []
 
     def violations(self, judge: Any, sampled: LoopMeasures) -> list[Real]:
-        """Return the violations (laws,) of each requirement of the loops, those of the sampled one first."""
-        entries = sampled.entries
-        return [
-            *self.loop_violations(0, sampled),
-            *self.loop_violations(1, measures_of(judge, entries, judge.also[0])),
-            *self._delay_violations(judge, entries),
-        ]
+        """Return the violations (laws,) of each requirement of the loops but the delays, of the sampled one first."""
+        continuous = measures_of(judge, sampled.entries, judge.also[0])
+        return [*self.loop_violations(0, sampled), *self.loop_violations(1, continuous)]
 
     def excess(self, judges: Sequence[Any], law: AnyLaw) -> float:
         """Return the sum of violations of a law on the models, the largest of the arms, without shifts."""
@@ -169,7 +175,8 @@ class Goal:
         found = []
         for judge in judges:
             loop = measures_of(judge, judge.entries(law))
-            found.append(float(plain._penalty(plain.violations(judge, loop))[0]))
+            violations = plain.violations(judge, loop) + plain.delay_violations(judge, loop.entries)
+            found.append(float(plain._penalty(violations)[0]))
         return max(found)
 
     def simulated_score(self, judge: Any, slew: SlewMeasures, law: AnyLaw) -> float:

@@ -10,10 +10,10 @@ from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.synthesis.drawn import Verification
 from tfarm.synthesis.goals import Checked
-from tfarm.synthesis.models import slew_and_after, trial_slew
 from tfarm.synthesis.required import RequirementSlope, is_active, names_of
 from tfarm.synthesis.requirements import MEASURES, NAMES, requirements_of
 from tfarm.synthesis.slew_measures import SlewMeasures
+from tfarm.synthesis.slew_models import slew_and_after, trial_slew
 from tfarm.synthesis.structures import Bounds
 from tfarm.synthesis.worst_case import WorstCase
 
