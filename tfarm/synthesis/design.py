@@ -32,7 +32,7 @@ from tfarm.loop.sampled_brief import sampled_brief
 from tfarm.loop.stability import stability
 from tfarm.records import frozen
 from tfarm.synthesis.drawn import AnyStudy, drawn_arms, verify
-from tfarm.synthesis.goals import norm_bound
+from tfarm.synthesis.goals import must_have_norm, norm_bound
 from tfarm.synthesis.judge import LOST, OBJECTIVES, TOO_SLOW, Judge, judge_of, model_sizes
 from tfarm.synthesis.near_map import find_near_map
 from tfarm.synthesis.required import RequiredLaw, RequirementTask, why_none
@@ -288,6 +288,11 @@ class _Options:
         for each in arms:
             ContinuousLoop(Case(each.arm, form.record_at(form.origin)))
             check_bounds(form, each.arm)
+        if self.weights is not None:
+            judge = judge_of(
+                self.arm, self.arm, self.chain, "damping", form.signals, self.modes, self.modes + 2
+            )
+            must_have_norm(judge, form, weights_of(self.weights))
         return arms, form
 
     def task(

@@ -27,7 +27,7 @@ from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import arm_under_chain
 from tfarm.dsp.stages import admit_case
-from tfarm.errors import ConvergenceError
+from tfarm.errors import ConvergenceError, require
 from tfarm.loop.loop_margins import bandwidth
 from tfarm.loop.norms import NormBound, norm
 from tfarm.loop.sampled_verdict import SAMPLED_LOOP
@@ -38,7 +38,7 @@ from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.judge import LOST, lost, of_laws, slowest_allowed
 from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.models import DesignModel
-from tfarm.synthesis.requirements import NORM, Requirement
+from tfarm.synthesis.requirements import MEASURES, NORM, Requirement
 from tfarm.synthesis.slew_measures import SlewMeasures
 from tfarm.synthesis.structures import Entry
 from tfarm.synthesis.worst_case import NamedArm
@@ -197,6 +197,12 @@ class Goal:
                 score += self.weight * max(each.violation(figures[each.name]) + shift, 0.0)
         return min(score, LOST)
 
+    def words(self, score: float) -> str:
+        """Return a score as the quantity that is minimised on the models."""
+        name = "time_constant_s" if _is_of_slew(self.minimised) else self.minimised
+        measure = MEASURES[name]
+        return f"{measure.title} {np.exp(score):.4g} {measure.unit}".rstrip() + ", violations counted"
+
     @staticmethod
     def worst(values: Sequence[float]) -> float:
         """Return the worst of its values."""
@@ -240,7 +246,7 @@ def _slower_than(w: float, judge: Any, entries: Sequence[Entry]) -> Real:
 
 
 def _is_of_slew(name: str) -> bool:
-    return Requirement(name, "<=", 1.0).measure.of_slew
+    return MEASURES[name].of_slew
 
 
 def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real, share: float) -> Real:
@@ -308,6 +314,18 @@ def norm_bound(case: Case, weights: Weights) -> NormBound:
     """Return the norm of the column of all weighted functions of a sampled loop, with its certified bound."""
     case = admit_case(SAMPLED_LOOP, case)
     return norm(case.arm, case.law, case.chain, weights=weights).bounds[-1]
+
+
+def must_have_norm(judge: Any, form: Any, weights: Weights) -> None:
+    """Raise ParameterError for a weight with which the norm is infinite at rest under the first law of a structure."""
+    entries = form.entries(form.coefficients(form.origin[:, None]))
+    # near rest, one a tenth of the other [rad]: a pole at rest that nothing cancels makes ten times as much
+    angles = np.array([1e-7, 1e-6])
+    for name, block in weights.blocks.items():
+        model = replace(judge.model, weights=Weights({name: block}, weights.period))
+        ((nearest, near),) = measures_of(judge, entries, model).weighted(None, angles)
+        remedy = "the norm is infinite: the function is not 0 at rest; give a stable pole"
+        require(nearest < 3 * near, f"weights.{name}", "integrator", remedy)
 
 
 def _bandwidths(name: str, case: Case) -> dict[str, float]:

@@ -196,6 +196,10 @@ class Objective(NamedTuple):
         """Return the score of a value one per cent worse."""
         return score + 0.01 * abs(score)
 
+    def words(self, score: float) -> str:
+        """Return a score as a value."""
+        return f"{-score if self.is_negated else score:.6g}"
+
     def worst(self, values: Sequence[float]) -> float:
         """Return the worst of its values."""
         return min(values) if self.is_negated else max(values)

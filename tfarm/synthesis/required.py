@@ -175,9 +175,11 @@ class RequirementTask:
                 if step >= max(map(len, sizes)):
                     break
                 continue
+            # further delays that change nothing: the models leave out what is missing
+            is_stuck = best is not None and SMALL < 0.99 * best.violation < chosen.violation and goal.delays
             if best is None or chosen.violation < best.violation:
                 best = chosen
-            if chosen.violation <= 0:
+            if chosen.violation <= 0 or is_stuck:
                 break
             near = chosen.x
             if goal.excess(judges, chosen.law) > MET:
