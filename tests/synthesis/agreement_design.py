@@ -40,10 +40,10 @@ from tfarm.dsp import Chain
 from tfarm.errors import ConvergenceError
 from tfarm.spectrum.gains import rate_unit
 from tfarm.spectrum.table import first_frequency
-from tfarm.synthesis.design import find_near_map
 from tfarm.synthesis.goals import SHARE_OF_SPEED, WEIGHT, Goal, check, measures_of, slowness
 from tfarm.synthesis.judge import LOST, of_laws
 from tfarm.synthesis.models import values_of
+from tfarm.synthesis.near_map import find_near_map
 from tfarm.synthesis.required import RequirementTask
 from tfarm.synthesis.requirements import GOOD
 from tfarm.synthesis.search import Worst, sobol

@@ -23,7 +23,7 @@ CHAIN = Chain()
 def region_of(name):
     arm = tfarm.load(name)
     x = rate_axis(arm)
-    return arm, good_region(arm, x, moment_axis(arm, x), CHAIN)
+    return arm, good_region(arm, x, moment_axis(arm, x), CHAIN, GOOD)
 
 
 def grades(arm, found, place):

@@ -296,6 +296,17 @@ def test_requirements_hold_on_a_further_arm_too():
         assert card.continuous.grade == card.sampled.grade == "good"
 
 
+def test_a_weight_with_an_infinite_norm_is_refused_before_any_search():
+    """The angle turns freely, so that T is 1 at rest, and S is 0 there."""
+    lines = []
+    integrator = ([1.0], [1.0, 0.0])
+    with pytest.raises(tfarm.ParameterError, match=r"weights\.T.*infinite"):
+        tfarm.design(LAB, weights={"T": integrator}, progress=lines.append)
+    assert not lines
+    assert tfarm.design(LAB, "time-constant", weights={"S": integrator}, progress=lines.append).norm.value < np.inf
+    assert all("best so far dominant time constant 0.1" in line for line in lines)
+
+
 def test_a_law_of_stricter_limits_is_one_of_laxer_limits(monkeypatch):
     """The second of three searches finds no law: it has that of the third, and the first none that is slower."""
     search = RequirementTask.find

@@ -26,7 +26,7 @@ from tfarm.schema import text
 from tfarm.synthesis import judge, search
 from tfarm.synthesis.design import design
 from tfarm.synthesis.judge import LOST, RESERVE, TOO_SLOW
-from tfarm.synthesis.models import in_blocks, squares
+from tfarm.synthesis.slew_models import in_blocks, squares
 from tfarm.synthesis.structures import STRUCTURES, structure_of
 from tfarm.tuner.trial import Cost, slew_trial
 from tfarm.tuner.tuning import usual_plan
@@ -189,7 +189,7 @@ def rastrigin(x):
 
 
 def least_of(function, low, high, near=None):
-    """The lowest point that a search finds between bounds, its score, and the lines of progress."""
+    """The lowest point that a search finds between bounds, its score, and the best score after each run."""
     low, high = np.array(low, dtype=float), np.array(high, dtype=float)
     form = SimpleNamespace(name="test", size=low.size, box=(low, high), origin=low)
     lines = []
@@ -198,15 +198,14 @@ def least_of(function, low, high, near=None):
         form,
         form.box,
         1.0,
-        lines.append,
+        lambda number, best: lines.append(best),
         near,
         "whole" if near is None else "near",
     )
     assert list(found.scores) == sorted(found.scores)
     assert found.scores[0] == min(of_runs)
     assert ((low[:, None] <= found.x) & (found.x <= high[:, None])).all()
-    best = [float(line.rpartition(" ")[2]) for line in lines]
-    assert best == sorted(best, reverse=True)
+    assert lines == sorted(lines, reverse=True)
     return found.x[:, 0], found.scores[0], lines
 
 

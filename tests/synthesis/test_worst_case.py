@@ -128,6 +128,7 @@ def test_a_design_of_one_arm_has_no_worst_case_and_the_given_bounds(capsys):
     assert found["designed_for"] == "sampled"
     rows = {row["name"]: row for row in found["coefficients"]}
     assert rows["K1"]["optimum"] == "none: search cut off at the bound"
+    assert rows["Kp"]["optimum"] == "fixed at 0"
     assert {name: row["bounds"] for name, row in rows.items()} == {"K1": [0.1, 2.0], "K2": [-0.1, 0.1], "Kp": None}
 
 

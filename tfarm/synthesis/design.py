@@ -32,9 +32,9 @@ from tfarm.loop.sampled_brief import sampled_brief
 from tfarm.loop.stability import stability
 from tfarm.records import frozen
 from tfarm.synthesis.drawn import AnyStudy, drawn_arms, verify
-from tfarm.synthesis.goals import norm_bound
-from tfarm.synthesis.good_region import map_region
+from tfarm.synthesis.goals import must_have_norm, norm_bound
 from tfarm.synthesis.judge import LOST, OBJECTIVES, TOO_SLOW, Judge, judge_of, model_sizes
+from tfarm.synthesis.near_map import find_near_map
 from tfarm.synthesis.required import RequiredLaw, RequirementTask, why_none
 from tfarm.synthesis.requirements import (
     MEASURES,
@@ -197,43 +197,6 @@ def design(
     return replace(options, weights=search_for.weights).with_norm(record)
 
 
-def find_near_map(
-    task: RequirementTask, named: Sequence[NamedArm], before: RequiredLaw | None, effort: Effort
-) -> RequiredLaw:
-    """Return the law of a search that begins at the region of the requirements in the map of both gains.
-
-    That region may be a sliver, between whose points a search finds none.  The fastest gains of its grid are near the
-    best: of one arm a short search follows.
-    """
-    form = task.form
-    is_free = form.name == TWO_GAINS and not form.given and not any(form.fixed.values())
-    region = None
-    if is_free and before is None and effort == "whole":
-        region = map_region(named[0].arm, task.chain, task.requirements)
-    if region is None:
-        return task.find(named, before, effort)
-    law = region.start
-    x = np.clip(form.at([*law.point]), *form.box)
-    search_at = Search(form, [], 1, 1, ())
-    start = RequiredLaw(Worst(()), search_at, np.inf, x, law, task.goal, ())
-    is_of_speed = task.minimised in ("settling_time_s", "time_constant_s")
-    is_near = is_of_speed and region.met.any() and len(named) == 1
-    found: RequiredLaw | None = None
-    failure = ConvergenceError("", None, None)
-    try:
-        found = task.find(named, start, "near" if is_near else effort)
-    except ConvergenceError as error:
-        failure = error
-    if found is None or found.violation > 0:
-        judges = tuple(task.judge(each.arm, task.goal, 0) for each in named)
-        chosen = task.examine(named, judges, search_at, x, task.goal)
-        if chosen.violation < (np.inf if found is None else found.violation):
-            found = chosen
-    if found is None:
-        raise failure
-    return found
-
-
 @lru_cache(maxsize=8)
 def recommended_gains(arm: Arm, chain: Chain) -> tuple[Design | None, str]:
     """Return the design by default of an arm, and the reason where there is none."""
@@ -325,6 +288,11 @@ class _Options:
         for each in arms:
             ContinuousLoop(Case(each.arm, form.record_at(form.origin)))
             check_bounds(form, each.arm)
+        if self.weights is not None:
+            judge = judge_of(
+                self.arm, self.arm, self.chain, "damping", form.signals, self.modes, self.modes + 2
+            )
+            must_have_norm(judge, form, weights_of(self.weights))
         return arms, form
 
     def task(

@@ -27,7 +27,7 @@ from tfarm.case import Case
 from tfarm.dsp import Chain
 from tfarm.dsp.plant import arm_under_chain
 from tfarm.dsp.stages import admit_case
-from tfarm.errors import ConvergenceError
+from tfarm.errors import ConvergenceError, require
 from tfarm.loop.loop_margins import bandwidth
 from tfarm.loop.norms import NormBound, norm
 from tfarm.loop.sampled_verdict import SAMPLED_LOOP
@@ -38,7 +38,7 @@ from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.judge import LOST, lost, of_laws, slowest_allowed
 from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.models import DesignModel
-from tfarm.synthesis.requirements import NORM, Requirement
+from tfarm.synthesis.requirements import MEASURES, NORM, Requirement
 from tfarm.synthesis.slew_measures import SlewMeasures
 from tfarm.synthesis.structures import Entry
 from tfarm.synthesis.worst_case import NamedArm
@@ -96,11 +96,11 @@ class Goal:
         Margins of the sampled loop are first: most laws are above their limit by these, whatever their speed.
         """
         scores = slowness(judge, entries) + self._least(judge)
-        for stage in (self._margins, self._speeds, self._continuous, self._delays):
+        for stage in (self._margins, self._speeds, self._continuous):
             left = np.flatnonzero(scores <= limits)
             if left.size:
                 scores[left] += stage(judge, of_laws(entries, left))
-        return scores
+        return self._with_delays(judge, entries, scores, limits)
 
     def _least(self, judge: Any) -> float:
         """Return a lower bound of the logarithm of the value."""
@@ -125,9 +125,19 @@ class Goal:
         """Return the penalties of the continuous-time loop (laws,)."""
         return self._penalty(self.loop_violations(1, measures_of(judge, entries, judge.also[0])))
 
-    def _delays(self, judge: Any, entries: Sequence[Entry]) -> Real:
-        """Return the penalties of unstable loops with the delays required (laws,)."""
-        return self._penalty(self._delay_violations(judge, entries))
+    def _with_delays(self, judge: Any, entries: Sequence[Entry], scores: Real, limits: Real) -> Real:
+        """Return the scores with the penalty of the fastest growth under the delays required (laws,).
+
+        The longest delay is first, by which most laws are above their limit.
+        """
+        found = scores.copy()
+        for model in reversed(judge.delayed):
+            left = np.flatnonzero(found <= limits)
+            if left.size:
+                growth = measures_of(judge, of_laws(entries, left), model).growth
+                penalty = self._penalty([growth / GROWTH_OF_DELAY])
+                found[left] = np.maximum(found[left], scores[left] + penalty)
+        return found
 
     def value(self, judge: Any, sampled: LoopMeasures) -> Real:
         """Return the quantity that is minimised, in place of one of the slew the dominant time constant (laws,)."""
@@ -149,19 +159,15 @@ class Goal:
                 found.append(each.violations(loop.of(each.name)) + shift)
         return found
 
-    def _delay_violations(self, judge: Any, entries: Sequence[Entry]) -> list[Real]:
+    def delay_violations(self, judge: Any, entries: Sequence[Entry]) -> list[Real]:
         """Return the growth (laws,) with the delays: the loop function leaves out that signals are read late."""
         growth = [measures_of(judge, entries, model).growth for model in judge.delayed]
         return [np.max(growth, axis=0) / GROWTH_OF_DELAY] if growth else []
 
     def violations(self, judge: Any, sampled: LoopMeasures) -> list[Real]:
-        """Return the violations (laws,) of each requirement of the loops, those of the sampled one first."""
-        entries = sampled.entries
-        return [
-            *self.loop_violations(0, sampled),
-            *self.loop_violations(1, measures_of(judge, entries, judge.also[0])),
-            *self._delay_violations(judge, entries),
-        ]
+        """Return the violations (laws,) of each requirement of the loops but the delays, of the sampled one first."""
+        continuous = measures_of(judge, sampled.entries, judge.also[0])
+        return [*self.loop_violations(0, sampled), *self.loop_violations(1, continuous)]
 
     def excess(self, judges: Sequence[Any], law: AnyLaw) -> float:
         """Return the sum of violations of a law on the models, the largest of the arms, without shifts."""
@@ -169,7 +175,8 @@ class Goal:
         found = []
         for judge in judges:
             loop = measures_of(judge, judge.entries(law))
-            found.append(float(plain._penalty(plain.violations(judge, loop))[0]))
+            violations = plain.violations(judge, loop) + plain.delay_violations(judge, loop.entries)
+            found.append(float(plain._penalty(violations)[0]))
         return max(found)
 
     def simulated_score(self, judge: Any, slew: SlewMeasures, law: AnyLaw) -> float:
@@ -189,6 +196,12 @@ class Goal:
             if each.measure.of_slew:
                 score += self.weight * max(each.violation(figures[each.name]) + shift, 0.0)
         return min(score, LOST)
+
+    def words(self, score: float) -> str:
+        """Return a score as the quantity that is minimised on the models."""
+        name = "time_constant_s" if _is_of_slew(self.minimised) else self.minimised
+        measure = MEASURES[name]
+        return f"{measure.title} {np.exp(score):.4g} {measure.unit}".rstrip() + ", violations counted"
 
     @staticmethod
     def worst(values: Sequence[float]) -> float:
@@ -233,7 +246,7 @@ def _slower_than(w: float, judge: Any, entries: Sequence[Entry]) -> Real:
 
 
 def _is_of_slew(name: str) -> bool:
-    return Requirement(name, "<=", 1.0).measure.of_slew
+    return MEASURES[name].of_slew
 
 
 def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real, share: float) -> Real:
@@ -301,6 +314,18 @@ def norm_bound(case: Case, weights: Weights) -> NormBound:
     """Return the norm of the column of all weighted functions of a sampled loop, with its certified bound."""
     case = admit_case(SAMPLED_LOOP, case)
     return norm(case.arm, case.law, case.chain, weights=weights).bounds[-1]
+
+
+def must_have_norm(judge: Any, form: Any, weights: Weights) -> None:
+    """Raise ParameterError for a weight with which the norm is infinite at rest under the first law of a structure."""
+    entries = form.entries(form.coefficients(form.origin[:, None]))
+    # near rest, one a tenth of the other [rad]: a pole at rest that nothing cancels makes ten times as much
+    angles = np.array([1e-7, 1e-6])
+    for name, block in weights.blocks.items():
+        model = replace(judge.model, weights=Weights({name: block}, weights.period))
+        ((nearest, near),) = measures_of(judge, entries, model).weighted(None, angles)
+        remedy = "the norm is infinite: the function is not 0 at rest; give a stable pole"
+        require(nearest < 3 * near, f"weights.{name}", "integrator", remedy)
 
 
 def _bandwidths(name: str, case: Case) -> dict[str, float]:

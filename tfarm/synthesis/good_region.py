@@ -25,10 +25,10 @@ from tfarm.loop.plane_axes import Axis, rate_axis
 from tfarm.records import frozen
 from tfarm.spectrum.table import first_frequency
 from tfarm.synthesis.goals import Goal, measures_of
-from tfarm.synthesis.judge import Judge, of_laws
+from tfarm.synthesis.judge import Judge, dominant_time_constant, of_laws
 from tfarm.synthesis.models import DesignModel
 from tfarm.synthesis.required import RequirementTask
-from tfarm.synthesis.requirements import GOOD, Requirement
+from tfarm.synthesis.requirements import Requirement
 from tfarm.synthesis.structures import Entry, structure_of
 
 # columns and rows of the grid over the map, and of the finer one around the region
@@ -103,7 +103,7 @@ def _intervals(
 
 @lru_cache(maxsize=8)
 def good_region(
-    arm: Arm, x: Axis, y: Axis, chain: Chain, requirements: tuple[Requirement, ...] = GOOD
+    arm: Arm, x: Axis, y: Axis, chain: Chain, requirements: tuple[Requirement, ...]
 ) -> GoodRegion | None:
     """Return the region in a picture of these axes; None where it has no stable gains or no models.
 
@@ -196,19 +196,32 @@ def _of_laws(judge: Judge, goal: Goal, entries: Sequence[Entry]) -> tuple[Real, 
     time_constant = np.full(laws.size, np.inf)
     # of some laws at once: each has some thousand points of L
     for some in np.array_split(laws, laws.size // 100 + 1):
-        growth = judge.model.growth(judge.model.poles(of_laws(entries, some)))
-        is_stable = growth.max(axis=1, initial=-np.inf) < 0
-        if is_stable.any():
-            sampled = measures_of(judge, of_laws(entries, some[is_stable]))
-            worst = np.max(goal.violations(judge, sampled), axis=0)
-            excess[some[is_stable]] = np.minimum(worst, UNSTABLE_EXCESS)
-            time_constant[some[is_stable]] = sampled.dominant_time_constant(first_frequency(judge.arm))
+        poles = judge.model.poles(of_laws(entries, some))
+        is_stable = judge.model.growth(poles).max(axis=1, initial=-np.inf) < 0
+        stable = some[is_stable]
+        if stable.size:
+            excess[stable] = np.minimum(_excess(judge, goal, of_laws(entries, stable)), UNSTABLE_EXCESS)
+            time_constant[stable] = dominant_time_constant(
+                judge.model, poles[is_stable], first_frequency(judge.arm)
+            )
     for model in judge.also:
         met = np.flatnonzero(excess <= 0)
         if met.size:
             growth = model.growth(model.poles(of_laws(entries, met))).max(axis=1)
             excess[met[growth >= 0]] = UNSTABLE_EXCESS
     return excess, time_constant
+
+
+def _excess(judge: Judge, goal: Goal, entries: Sequence[Entry]) -> Real:
+    """Return the largest violation of stable laws (laws,); those far from the region without the delays required."""
+    # of a limit
+    far = 0.2
+    loop = measures_of(judge, entries)
+    excess = np.max(goal.violations(judge, loop), axis=0)
+    near = np.flatnonzero(excess <= max(far, float(excess.min())))
+    for late in goal.delay_violations(judge, of_laws(entries, near)):
+        excess[near] = np.maximum(excess[near], late)
+    return np.asarray(excess)
 
 
 def _measured(judge: Judge, goal: Goal, arm: Arm, x: Real, y: Real) -> GoodRegion:

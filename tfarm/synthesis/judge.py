@@ -37,7 +37,8 @@ from tfarm.loop.sampled_verdict import UNDAMPED_MODES, sampled_verdict
 from tfarm.loop.stability import stability
 from tfarm.records import frozen
 from tfarm.spectrum.table import first_frequency
-from tfarm.synthesis.models import DesignModel, Slews, continuous_model, sampled_model, slew_and_after
+from tfarm.synthesis.models import DesignModel, continuous_model, sampled_model
+from tfarm.synthesis.slew_models import Slews, slew_and_after
 from tfarm.synthesis.structures import Entry, polynomial_of
 
 # factor on all gains with which the loop is stable, up and down: the error of a gauge or motor
@@ -194,6 +195,10 @@ class Objective(NamedTuple):
     def within_one_per_cent(self, score: float) -> float:
         """Return the score of a value one per cent worse."""
         return score + 0.01 * abs(score)
+
+    def words(self, score: float) -> str:
+        """Return a score as a value."""
+        return f"{-score if self.is_negated else score:.6g}"
 
     def worst(self, values: Sequence[float]) -> float:
         """Return the worst of its values."""

@@ -135,14 +135,14 @@ class LoopMeasures:
         near = size[..., None] + width[..., None] * np.linspace(-2, 2, 9)
         near = np.take_along_axis(near, first[..., None], 1)
         angles = self.model.angles
-        on_grid = self._weighted(self.L, angles)
-        about = self._weighted(None, near.reshape(laws, -1))
+        on_grid = self.weighted(self.L, angles)
+        about = self.weighted(None, near.reshape(laws, -1))
         places = peak_place(about.reshape(-1, 9), near.reshape(-1, 9)).reshape(laws, -1)
         largest = peak_place(on_grid, np.broadcast_to(angles, on_grid.shape))[:, None]
-        between = self._weighted(None, np.hstack([largest, places]))
+        between = self.weighted(None, np.hstack([largest, places]))
         return np.asarray(np.hstack([on_grid, about, between]).max(axis=1))
 
-    def _weighted(self, L: Complex | None, angles: Real) -> Real:
+    def weighted(self, L: Complex | None, angles: Real) -> Real:
         """Return the size (laws, m) of that column at angles (m,) or (laws, m), of L if known there."""
         model = self.model
         assert model.weights is not None

@@ -175,9 +175,11 @@ class RequirementTask:
                 if step >= max(map(len, sizes)):
                     break
                 continue
+            # further delays that change nothing: the models leave out what is missing
+            is_stuck = best is not None and SMALL < 0.99 * best.violation < chosen.violation and goal.delays
             if best is None or chosen.violation < best.violation:
                 best = chosen
-            if chosen.violation <= 0:
+            if chosen.violation <= 0 or is_stuck:
                 break
             near = chosen.x
             if goal.excess(judges, chosen.law) > MET:
@@ -326,20 +328,19 @@ class RequirementTask:
         A margin without a limit has none.
         """
         form = choice.search.form
-        change = 0.001
+        # of a coefficient: a slope has the error of its bend over that, and the digits of a margin are far below
+        change = 1e-4
+        values = loop_values("sampled", Case(self.arm, choice.law, self.chain), self.weights)
         found = []
         for n, coefficient in enumerate(form.names):
-            cards = []
-            for factor in (1 + change, 1 - change):
-                c = form.coefficients(choice.x)
-                c[n] *= factor
-                case = Case(self.arm, form.record_at(form.at(c)), self.chain)
-                cards.append(loop_values("sampled", case, self.weights))
+            c = form.coefficients(choice.x)
+            c[n] *= 1 + change
+            case = Case(self.arm, form.record_at(form.at(c)), self.chain)
+            changed = loop_values("sampled", case, self.weights)
             for each in self.requirements:
                 if not each.measure.is_of(0):
                     continue
-                above, below = (values.get(each.name, np.inf) for values in cards)
-                slope = (above - below) / (2 * change) / 100
+                slope = (changed.get(each.name, np.inf) - values.get(each.name, np.inf)) / change / 100
                 if np.isfinite(slope):
                     found.append(RequirementSlope(str(each), coefficient, slope))
         return found

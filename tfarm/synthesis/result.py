@@ -10,10 +10,10 @@ from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.synthesis.drawn import Verification
 from tfarm.synthesis.goals import Checked
-from tfarm.synthesis.models import slew_and_after, trial_slew
 from tfarm.synthesis.required import RequirementSlope, is_active, names_of
 from tfarm.synthesis.requirements import MEASURES, NAMES, requirements_of
 from tfarm.synthesis.slew_measures import SlewMeasures
+from tfarm.synthesis.slew_models import slew_and_after, trial_slew
 from tfarm.synthesis.structures import Bounds
 from tfarm.synthesis.worst_case import WorstCase
 
@@ -190,12 +190,39 @@ class Design:
         optima |= dict.fromkeys(self.widened, "inside bounds that were widened")
         optima |= dict.fromkeys(self.at_bound, "none: search cut off at the bound")
         optima |= dict.fromkeys(self.at_limit, "at the physical limit")
-        return [
-            OptimalCoefficient(
-                name, value, self.flat.get(name), self.bounds.get(name), optima.get(name, "given")
+        found = []
+        for name, value in self.coefficients.items():
+            fixed = "fixed" if value else "fixed at 0"
+            flat = self.flat.get(name)
+            found.append(
+                OptimalCoefficient(name, value, flat, self.bounds.get(name), optima.get(name, fixed))
             )
-            for name, value in self.coefficients.items()
-        ]
+        return found
+
+    @property
+    def objective_in_words(
+        self,
+    ) -> Annotated[
+        str,
+        Quantity("objective in words", key="objective_in_words", help="the quantity, and what decides at 0"),
+    ]:
+        """Title and unit of the quantity that is the objective."""
+        # of objectives without requirements
+        plain = {
+            "damping": "least damping ratio of the first modes",
+            "margin": "disk margin",
+            "sensitivity": "largest |S|",
+            "delay": "delay margin, s",
+            "residual": "residual root moment after the slew, N m",
+            "cost": "cost of the tuner's trial",
+        }
+        if not self.requirements and self.objective in plain:
+            return plain[self.objective]
+        measure = MEASURES[NAMES[self.objective]]
+        words = f"{measure.title}, {measure.unit}" if measure.unit else measure.title
+        if NAMES[self.objective].endswith("settling_time_s") and self.value == 0:
+            words = f"{words}: the tip is within 2 % when the motion ends, and the time constant decides"
+        return words
 
     @property
     def slew_duration(

@@ -99,8 +99,14 @@ def search(
     reach = 4.0
     movable = form.ends(physical=False)
     region = form.wider(movable, reach)
+    words = judge.judges[0].objective.words
+
+    def report(number: int, best: float) -> None:
+        found = "no stable law yet" if best >= LOST else f"best so far {words(best)}"
+        tell(f"{form.name}: search {number}, {found}")
+
     (x, scores), of_runs = minimise_runs(
-        partial(judge.scores, region), form, region.box, judge.work, tell, near, effort
+        partial(judge.scores, region), form, region.box, judge.work, report, near, effort
     )
     for place, end in region.ends(physical=True):
         moved = x[:, :1].copy()
@@ -123,16 +129,17 @@ def minimise_runs(
     form: Structure,
     box: tuple[Real, Real],
     work: float,
-    tell: Tell,
+    report: Callable[[int, float], None],
     near: Real | None,
     effort: Effort,
 ) -> tuple[Points, list[float]]:
     """Return the last points of all runs, and the best score of each.
 
     `score` takes points (n, k) of the box, and limits (k,) above which any value will do; `work` is that of a law,
-    relative to the usual one.  Runs begin within the bounds of `form`, the first also with its start or a point `near`
-    the best, and are more where no loop is stable yet: the end of a sketch.  Then follow one with the best points of
-    all, not of a search near a point, some near the best as long as that gains, and a simplex at the best of all.
+    relative to the usual one; `report` is given the number of each run and the best score so far.  Runs begin within
+    the bounds of `form`, the first also with its start or a point `near` the best, and are more where no loop is stable
+    yet: the end of a sketch.  Then follow one with the best points of all, not of a search near a point, some near the
+    best as long as that gains, and a simplex at the best of all.
     """
     # one run more than coefficients: some minima are found by one of five alone
     runs = 1
@@ -149,7 +156,7 @@ def minimise_runs(
         nonlocal best
         ended.append(evolve_points(score, box, points, rounds, len(ended)))
         best = min(best, ended[-1].scores[0])
-        tell(f"{form.name}: search {len(ended)}, best so far {best:.6g}")
+        report(len(ended), float(best))
 
     for seed in range(MOST_RUNS):
         if seed >= runs and best < LOST:

@@ -33,9 +33,10 @@ from tfarm.records import frozen
 from tfarm.schema import Column
 from tfarm.spectrum.gains import default_gains
 from tfarm.spectrum.table import first_frequency
-from tfarm.synthesis.good_region import GoodRegion, good_region
+from tfarm.synthesis.good_region import GoodRegion, map_region
 from tfarm.synthesis.judge import damping_of
 from tfarm.synthesis.models import continuous_model
+from tfarm.synthesis.requirements import GOOD
 from tfarm.synthesis.structures import Entry
 
 # of the gain that balances a torque: 1 where the input is one, less for a motor's current
@@ -192,7 +193,8 @@ def stability_map(arm: Arm, chain: Chain) -> StabilityMap:
         coarse,
         least_damping(coarse),
         sampled_region(arm, x, y, chain),
-        good_region(arm, x, y, chain),
+        # where the design of the arm begins, too
+        map_region(arm, chain, GOOD),
     )
 
 

@@ -1,15 +1,14 @@
 """The front of speed against robustness: laws of least settling time, say, under limits of all strengths.
 
 A robustness of 1 has the limits of the grade *good*: gain margin 6 r dB, phase margin 45 r deg, delay margin r
-periods, and Ms = 1 + 1/r.  A law is sought near that of the robustness before, so that the front has no jumps where the
-optimum has none.
+periods, and Ms = 1 + 1/r.  From strict to lax limits a law is sought near the one before, which meets them, so that the
+front has no jumps where the optimum has none.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from operator import attrgetter
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from tfarm.arm import AnyLaw
 from tfarm.errors import ConvergenceError
 from tfarm.records import frozen
 from tfarm.schema import Quantity
+from tfarm.synthesis.near_map import find_near_map
 from tfarm.synthesis.required import RequiredLaw, RequirementTask
 from tfarm.synthesis.requirements import GOOD, MEASURES, limits_of_good
 from tfarm.synthesis.worst_case import NamedArm
@@ -59,22 +59,20 @@ def front(task: RequirementTask, named: Sequence[NamedArm], number: int = 12) ->
     limited = {each.name for each in GOOD}
     others = tuple(each for each in task.requirements if each.name not in limited)
     before: RequiredLaw | None = None
-    points = []
+    points: list[FrontPoint] = []
     laws: list[Any] = []
-    # from less than half of the limits of good to nearly twice as strict ones
-    for robustness in np.geomspace(0.4, 1.9, number).tolist():
+    failure: ConvergenceError | None = None
+    # from nearly twice the limits of good to less than half as strict ones: a law that is met stays so
+    for robustness in np.geomspace(1.9, 0.4, number).tolist():
         own = replace(task, requirements=(*limits_of_good(robustness), *others))
-        start = None if before is None else before._replace(goal=own.goal)
         try:
-            found = own.find(named, start, "whole" if before is None else "near")
-            if found.violation > 0 and before is not None:
-                # the optimum has jumped to another part of the plane
-                other = own.find(named, None, "whole")
-                found = min(found, other, key=attrgetter("violation"))
-        except ConvergenceError:
-            if before is None:
-                raise
-            break
+            if before is not None and before.violation <= 0:
+                found = own.find(named, before._replace(goal=own.goal), "near")
+            else:
+                found = find_near_map(own, named, None, "whole")
+        except ConvergenceError as error:
+            failure = error
+            continue
         values = task.values_on(task.arm, found.law)
         form = found.search.form
         points.append(
@@ -91,7 +89,12 @@ def front(task: RequirementTask, named: Sequence[NamedArm], number: int = 12) ->
             )
         )
         laws.append(found.law)
-        before = found
+        if found.violation <= 0 or before is None or before.violation > 0:
+            before = found
+    if failure is not None and not points:
+        raise failure
+    points.reverse()
+    laws.reverse()
     # a law that meets stricter limits meets laxer ones too, and is taken where the search found a worse one
     for n in range(len(points) - 2, -1, -1):
         stricter = points[n + 1]
