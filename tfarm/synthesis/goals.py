@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Annotated, Any, NamedTuple, cast
@@ -39,6 +39,7 @@ from tfarm.synthesis.judge import LOST, lost, of_laws, slowest_allowed
 from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.models import DesignModel
 from tfarm.synthesis.requirements import MEASURES, NORM, Requirement
+from tfarm.synthesis.search import Search, Worst, sobol
 from tfarm.synthesis.slew_measures import SlewMeasures
 from tfarm.synthesis.structures import Entry
 from tfarm.synthesis.worst_case import NamedArm
@@ -169,6 +170,18 @@ class Goal:
         continuous = measures_of(judge, sampled.entries, judge.also[0])
         return [*self.loop_violations(0, sampled), *self.loop_violations(1, continuous)]
 
+    def on_models(self, judges: Sequence[Any], law: AnyLaw) -> Real:
+        """Return the largest violations (2, requirements) of a law on the models, without shifts; -1 of a slew."""
+        found = np.full((2, len(self.requirements)), -1.0)
+        for judge in judges:
+            entries = judge.entries(law)
+            for number, model in enumerate((judge.model, *judge.also[:1])):
+                loop = measures_of(judge, entries, model)
+                for n, each in enumerate(self.requirements):
+                    if each.measure.is_of(number):
+                        found[number, n] = max(found[number, n], each.violations(loop.of(each.name))[0])
+        return found
+
     def excess(self, judges: Sequence[Any], law: AnyLaw) -> float:
         """Return the sum of violations of a law on the models, the largest of the arms, without shifts."""
         plain = replace(self, shifts=((), ()), weight=1.0)
@@ -249,24 +262,58 @@ def _is_of_slew(name: str) -> bool:
     return MEASURES[name].of_slew
 
 
-def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real, share: float) -> Real:
-    """Return the point of a simplex that begins at x, with the slew simulated on every arm.
-
-    `share` is that of its usual size and number of steps.
-    """
+def simulated_scores(goal: Goal, judges: Sequence[Any]) -> Callable[[AnyLaw], list[float]]:
+    """Return a function from a law to its score on every arm, with its slew."""
     # modes of a slew that is simulated hundreds of times
     modes = 8
     names = (goal.minimised, *(each.name for each in goal.requirements))
     parts = tuple(each for each in PARTS if any(name.startswith(f"{each}.") for name in names))
     slews = [SlewMeasures(judge.arm, judge.known, judge.chain, modes, parts) for judge in judges]
+    return lambda law: [goal.simulated_score(*pair, law) for pair in zip(judges, slews, strict=True)]
+
+
+def by_slews(goal: Goal, judges: Sequence[Any], found: Search) -> list[tuple[float, Real]]:
+    """Return the points of a search, and others of a sequence of Sobol, in the order of their slews.
+
+    A law that is slower on the models may settle sooner.  The first three are ends of simplices.
+    """
+    # laws of the sequence whose value on the models is at most that many times the best, and their largest number
+    slower = 5.0
+    most = 40
+    form = found.form
+    points = sobol(*form.box, 1024, 99)
+    of_models = Worst(tuple(judges)).scores(form, points)
+    (near,) = np.nonzero(of_models < found.found[0][0] + np.log(slower))
+    # in the order of the sequence, in which any first ones are spread over all
+    near = near[:most]
+    scores = simulated_scores(goal, judges)
+    candidates = [x for _, x in found.found] + list(points[:, near].T)
+    ranked = sorted(((max(scores(form.record_at(x))), n) for n, x in enumerate(candidates)))
+    low, high = form.box
+    chosen: list[Real] = []
+    for _, n in ranked:
+        x = candidates[n]
+        if len(chosen) < 3 and all((abs(x - other) > 0.05 * (high - low)).any() for other in chosen):
+            chosen.append(x)
+    ends = [polished(goal, judges, form, x, 1.0, 0.5) for x in chosen]
+    pairs = [(max(scores(form.record_at(x))), n, x) for n, x in enumerate(ends)]
+    return [(score, x) for score, _, x in sorted(pairs)] or found.found
+
+
+def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real, size: float, share: float) -> Real:
+    """Return the point of a simplex that begins at x, with the slew simulated on every arm.
+
+    `size` and `share` are of its usual size and its usual number of steps.
+    """
+    scores = simulated_scores(goal, judges)
 
     def score(at: Real) -> float:
-        law = form.record_at(at)
-        return max(goal.simulated_score(judge, slew, law) for judge, slew in zip(judges, slews, strict=True))
+        return max(scores(form.record_at(at)))
 
     low, high = form.box
-    step = 0.02 * share * (high - low)
-    edges = np.diag(np.where(x + step > high, -step, step))
+    step = 0.02 * size * (high - low)
+    is_outside = (x + step > high) | (x + step < low)
+    edges = np.diag(np.where(is_outside, -step, step))
     most = int(60 * share * form.size)
     options = {"initial_simplex": [x, *(x + edges)], "maxfev": most, "adaptive": form.size > 2}
     done = cast("Any", minimize)(

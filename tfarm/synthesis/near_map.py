@@ -17,8 +17,7 @@ def find_near_map(
 ) -> RequiredLaw:
     """Return the law of a search that begins at the region of the requirements in the map of both gains.
 
-    That region may be a sliver, between whose points a search finds none.  The fastest gains of its grid are near the
-    best: of one arm a short search follows.
+    That region may be a sliver, between whose points a search finds none.
     """
     form = task.form
     is_free = form.name == TWO_GAINS and not form.given and not any(form.fixed.values())
@@ -31,12 +30,10 @@ def find_near_map(
     x = np.clip(form.at([*law.point]), *form.box)
     search_at = Search(form, [], 1, 1, ())
     start = RequiredLaw(Worst(()), search_at, np.inf, x, law, task.goal, ())
-    is_of_speed = task.minimised in ("settling_time_s", "time_constant_s")
-    is_near = is_of_speed and region.met.any() and len(named) == 1
     found: RequiredLaw | None = None
     failure = ConvergenceError("", None, None)
     try:
-        found = task.find(named, start, "near" if is_near else effort)
+        found = task.find(named, start, effort)
     except ConvergenceError as error:
         failure = error
     if found is None or found.violation > 0:

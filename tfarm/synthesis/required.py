@@ -30,11 +30,13 @@ from tfarm.synthesis.goals import (
     WEIGHT,
     Checked,
     Goal,
+    by_slews,
     check,
     exact_values,
     loop_values,
     measures_of,
     polished,
+    simulated_scores,
 )
 from tfarm.synthesis.judge import LOST, Judge, judge_of, model_sizes
 from tfarm.synthesis.models import sampled_model
@@ -159,6 +161,8 @@ class RequirementTask:
                 share = 0.25
             else:
                 found = search(worst, form, self.tell, near, effort if attempt == 0 else "near")
+                if attempt == 0 and effort == "whole" and goal.by_simulation and found.found[0][0] < LOST:
+                    found = found._replace(found=by_slews(goal, judges, found))
             form = found.form
             law = form.record_at(found.found[0][1])
             if found.found[0][0] >= LOST:
@@ -166,7 +170,9 @@ class RequirementTask:
             if effort == "sketch":
                 return RequiredLaw(Worst(judges), found, *found.found[0], law, goal, ())
             candidates = (
-                self.examine(named, judges, found, x, goal, share) for score, x in found.found if score < LOST
+                self.examine(named, judges, found, x, goal, share, share)
+                for score, x in found.found
+                if score < LOST
             )
             # the best on the models may be unstable by a mode that they leave out
             chosen = next((each for each in candidates if np.isfinite(each.violation)), None)
@@ -179,7 +185,9 @@ class RequirementTask:
             is_stuck = best is not None and SMALL < 0.99 * best.violation < chosen.violation and goal.delays
             if best is None or chosen.violation < best.violation:
                 best = chosen
-            if chosen.violation <= 0 or is_stuck:
+            if chosen.violation <= 0:
+                return self._relaxed(named, judges, chosen)
+            if is_stuck:
                 break
             near = chosen.x
             if goal.excess(judges, chosen.law) > MET:
@@ -200,16 +208,46 @@ class RequirementTask:
         found: Search,
         x: Real,
         goal: Goal,
+        size: float = 1.0,
         share: float = 1.0,
     ) -> RequiredLaw:
         """Return the end of a simplex from a point, with the exact values of all requirements on each arm.
 
         Where the exact loop of that is unstable, it is the law at the point.
         """
-        better = self._exact(named, judges, found, polished(goal, judges, found.form, x, share), goal)
+        better = self._exact(named, judges, found, polished(goal, judges, found.form, x, size, share), goal)
         if np.isfinite(better.violation):
             return better
         return self._exact(named, judges, found, x, goal)
+
+    def _relaxed(
+        self, named: Sequence[NamedArm], judges: tuple[Judge, ...], chosen: RequiredLaw
+    ) -> RequiredLaw:
+        """Return a law that meets the requirements, with less left of those by which the models are stricter.
+
+        The shift of a requirement is what the exact loops violate more than the models at the law before.
+        """
+        # of a violation: what is farther from its limit is not active
+        near = 0.1
+        is_other = [each.name != DELAY for each in self.requirements]
+        # sizes of simplices to either side, each begun at the end of the one before
+        for size in (0.5, -0.5, 0.2):
+            goal = chosen.goal
+            by_models = goal.on_models(judges, chosen.law)
+            shifts = np.array(goal.shifts) if any(goal.shifts) else np.zeros_like(by_models)
+            gap = chosen.violations - by_models + 1e-5
+            is_known = (chosen.violations > -near) & np.isfinite(gap) & is_other
+            shifts = np.where(is_known, gap, shifts) - shifts
+            better = self.examine(named, judges, chosen.search, chosen.x, goal.tighter(shifts), size, 0.5)
+            gain = self._aim(judges, chosen) - self._aim(judges, better)
+            if better.violation <= 0 and gain > 0:
+                chosen = better
+        return chosen
+
+    def _aim(self, judges: tuple[Judge, ...], choice: RequiredLaw) -> float:
+        """Return the logarithm of the quantity that is minimised, on the models with their slews."""
+        plain = Goal((), self.minimised, weights=self.weights)
+        return max(simulated_scores(plain, judges)(choice.law))
 
     def _exact(
         self, named: Sequence[NamedArm], judges: tuple[Judge, ...], found: Search, x: Real, goal: Goal
