@@ -69,6 +69,7 @@ CHANGES = {  # another value of each key, and what it needs beside it
     "reference.shaper": ("ZV", IDEAL),
     "reference.modes": (1, Chain(reference=ReferenceShaping(shaper="ZV"))),
     "reference.file": (PROFILES[1], Chain(reference=ReferenceShaping(profile="file", file=PROFILES[0]))),
+    "reference.feedforward": ("inverse", Chain(reference=ReferenceShaping(profile="polynomial"))),
 }
 
 

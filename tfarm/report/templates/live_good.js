@@ -75,7 +75,7 @@ function edgesOf({ w, row, at }) {
   }
   return found;
 }
-// The end "low" or "high" of a run to rounding, between its point and those beside; false where it is already
+// The end "low" or "high" of a run to rounding, between its point and the next ones; false where it is already
 function refined(run, key) {
   const exact = run.exact ||= {}, side = key === "low" ? 0 : 1, i = side ? run.last : run.first, sign = side ? -1 : 1;
   if (exact[key]) return false;
