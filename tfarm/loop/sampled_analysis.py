@@ -78,7 +78,7 @@ class Analysis(LoopAnalysis):
         if self.loop.is_of_gains:
             return [SampledNumber(n, numbers[n], each, self.interval(n)) for n, each in self.shown.items()]
         names = [name for name, value in numbers.items() if value]
-        found = windows_on_circle(self.loop, names) if names else {}
+        found = windows_on_circle(self.verdict.full, names) if names else {}
         return [
             SampledNumber(n, numbers[n], each, interval_around(each, numbers[n])) for n, each in found.items()
         ]
@@ -209,7 +209,7 @@ class Analysis(LoopAnalysis):
             help="smallest additional delay that destabilises the loop, over the sampling period",
         ),
     ]:
-        """The delay margin [samples]; of any law but gains at the hub with the modes of the verdict."""
+        """The delay margin [samples]; of any law but gains at the hub with every mode of the range."""
         return self.delay_limit.figure
 
     @cached_property
@@ -217,9 +217,9 @@ class Analysis(LoopAnalysis):
         """The delay margin [samples] to the last digit, with a test of its digits for gains at the hub."""
         if self.loop.is_of_gains:
             return delay_limit(self.loop, self.verdict.band)
-        found = delay_margin(self.loop)
+        found = delay_margin(self.verdict.full)
         # four digits of the delay margin of a law that is more than gains at the hub
-        return Figure(found.samples, 4, None, self.verdict.modes_used, found.is_bound)
+        return Figure(found.samples, 4, None, self.verdict.full.plant.count, found.is_bound)
 
     @property
     def delay_margin(self) -> DelayMargin:
@@ -251,7 +251,7 @@ class Analysis(LoopAnalysis):
         """Return the intervals of a positive factor on the law at each further delay [s] (n,)."""
         sampling = self.loop.chain.sampling
         late = sampling.delay_samples + delays / sampling.period
-        return [stable_windows(self.loop.with_delay(each), FACTOR) for each in late.tolist()]
+        return [stable_windows(self.verdict.full.with_delay(each), FACTOR) for each in late.tolist()]
 
     @property
     def stable_gain_factors(

@@ -185,9 +185,9 @@ class RequirementTask:
             is_stuck = best is not None and SMALL < 0.99 * best.violation < chosen.violation and goal.delays
             if best is None or chosen.violation < best.violation:
                 best = chosen
-            if chosen.violation <= 0:
+            if chosen.violation <= 0 and effort == "whole":
                 return self._relaxed(named, judges, chosen)
-            if is_stuck:
+            if chosen.violation <= 0 or is_stuck:
                 break
             near = chosen.x
             if goal.excess(judges, chosen.law) > MET:
@@ -230,8 +230,10 @@ class RequirementTask:
         # of a violation: what is farther from its limit is not active
         near = 0.1
         is_other = [each.name != DELAY for each in self.requirements]
-        # sizes of simplices to either side, each begun at the end of the one before
-        for size in (0.5, -0.5, 0.2):
+        # of simplices to either side, each begun at the end of the one before; one where a slew takes longer
+        sizes = (0.5, -0.5, 0.2) if chosen.search.form.size <= 2 else (0.5,)
+        value = self._aim(judges, chosen)
+        for size in sizes:
             goal = chosen.goal
             by_models = goal.on_models(judges, chosen.law)
             shifts = np.array(goal.shifts) if any(goal.shifts) else np.zeros_like(by_models)
@@ -239,9 +241,10 @@ class RequirementTask:
             is_known = (chosen.violations > -near) & np.isfinite(gap) & is_other
             shifts = np.where(is_known, gap, shifts) - shifts
             better = self.examine(named, judges, chosen.search, chosen.x, goal.tighter(shifts), size, 0.5)
-            gain = self._aim(judges, chosen) - self._aim(judges, better)
-            if better.violation <= 0 and gain > 0:
+            found = self._aim(judges, better)
+            if better.violation <= 0 and found < value:
                 chosen = better
+                value = found
         return chosen
 
     def _aim(self, judges: tuple[Judge, ...], choice: RequiredLaw) -> float:
