@@ -210,6 +210,17 @@ class Goal:
                 score += self.weight * max(each.violation(figures[each.name]) + shift, 0.0)
         return min(score, LOST)
 
+    @property
+    def below_models(self) -> float:
+        """The difference of the score with a slew to that on the models, at least; -inf where that is not known.
+
+        Where the tip is at rest when the motion ends the settling time is 0, and the law with the best score on the
+        models is the best.
+        """
+        if self.minimised.endswith("settling_time_s"):
+            return float(np.log(SHARE_OF_SPEED))
+        return -np.inf if _is_of_slew(self.minimised) else 0.0
+
     def words(self, score: float) -> str:
         """Return a score as the quantity that is minimised on the models."""
         name = "time_constant_s" if _is_of_slew(self.minimised) else self.minimised

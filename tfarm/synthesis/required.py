@@ -52,6 +52,8 @@ NEAR = 0.05
 # by the exact loops: up to it a simplex corrects the law, beyond it a search
 SMALL = 0.1
 DELAY = "delay_margin_periods"
+# of scores, logarithms of a quantity: a smaller difference is none
+SAME = 3e-3
 
 
 class RequiredLaw(NamedTuple):
@@ -149,6 +151,8 @@ class RequirementTask:
         sizes = [model_sizes(each.arm, self.chain, self.modes, continuous=False) for each in named]
         step = 0
         chosen: RequiredLaw | None = None
+        # no score with a slew is below
+        least = -np.inf
         # with the large models of undamped arms a search takes a minute
         attempts = 2 if any(each.arm.has_elastic_link for each in named) else 8
         for attempt in range(attempts):
@@ -161,8 +165,13 @@ class RequirementTask:
                 share = 0.25
             else:
                 found = search(worst, form, self.tell, near, effort if attempt == 0 else "near")
-                if attempt == 0 and effort == "whole" and goal.by_simulation and found.found[0][0] < LOST:
-                    found = found._replace(found=by_slews(goal, judges, found))
+                if attempt == 0 and effort == "whole" and found.found[0][0] < LOST:
+                    score, x = found.found[0]
+                    least = score + goal.below_models
+                    if max(simulated_scores(goal, judges)(form.record_at(x))) < least + SAME:
+                        share = 0.25
+                    else:
+                        found = found._replace(found=by_slews(goal, judges, found))
             form = found.form
             law = form.record_at(found.found[0][1])
             if found.found[0][0] >= LOST:
@@ -186,7 +195,7 @@ class RequirementTask:
             if best is None or chosen.violation < best.violation:
                 best = chosen
             if chosen.violation <= 0 and effort == "whole":
-                return self._relaxed(named, judges, chosen)
+                return self._relaxed(named, judges, chosen, least)
             if chosen.violation <= 0 or is_stuck:
                 break
             near = chosen.x
@@ -221,11 +230,12 @@ class RequirementTask:
         return self._exact(named, judges, found, x, goal)
 
     def _relaxed(
-        self, named: Sequence[NamedArm], judges: tuple[Judge, ...], chosen: RequiredLaw
+        self, named: Sequence[NamedArm], judges: tuple[Judge, ...], chosen: RequiredLaw, least: float
     ) -> RequiredLaw:
         """Return a law that meets the requirements, with less left of those by which the models are stricter.
 
-        The shift of a requirement is what the exact loops violate more than the models at the law before.
+        The score is not searched below the `least`.  The shift of a requirement is what the exact loops violate more
+        than the models at the law before.
         """
         # of a violation: what is farther from its limit is not active
         near = 0.1
@@ -234,6 +244,8 @@ class RequirementTask:
         sizes = (0.5, -0.5, 0.2) if chosen.search.form.size <= 2 else (0.5,)
         value = self._aim(judges, chosen)
         for size in sizes:
+            if value < least + SAME:
+                break
             goal = chosen.goal
             by_models = goal.on_models(judges, chosen.law)
             shifts = np.array(goal.shifts) if any(goal.shifts) else np.zeros_like(by_models)
