@@ -10,9 +10,10 @@ from matplotlib import pyplot
 import tfarm
 from tests.report.written import coarsen
 from tfarm.dsp import Chain
+from tfarm.report.arm_file import command_of
 from tfarm.report.blocks import PICTURES, save_section
 from tfarm.report.loop_section import locus_section, nyquist_section
-from tfarm.report.page import ArmReport, command_of
+from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import arm_section, bode_section, modes_section
 
 mpl.use("Agg")

@@ -25,8 +25,9 @@ from tfarm.errors import one_line
 from tfarm.fitting.recording import compare_run, load_run, overshoot
 from tfarm.loop.sampled import sampled_loop
 from tfarm.report import writing
+from tfarm.report.arm_file import file_of
 from tfarm.report.loop_section import law_section, margins_section
-from tfarm.report.page import ArmReport, GivenLaw, file_of
+from tfarm.report.page import ArmReport, GivenLaw
 from tfarm.report.sampled_section import sampled_section, step_rows
 from tfarm.report.sections import pieces_of
 from tfarm.schema import to_json

@@ -217,6 +217,11 @@ class Other:
 
         return score
 
+    def is_met(self, law):
+        """Whether the exact cards of a law meet all requirements."""
+        _, violations = check(self.goal, self.task.arm, self.task.chain, self.named, law)
+        return violations.max() <= ROUNDING
+
     def on_card(self, x):
         """Violations (2, requirements) of a point by its exact cards; the best that meets them all is kept."""
         law = self.form.record_at(x)

@@ -105,6 +105,23 @@ class UncertainLoop:
         return np.asarray(abs(x) @ self.dP.T + np.outer(abs(u), self.db) + np.outer(of_u, by_u))
 
 
+def turning_unit(middle: Real, radius: Real) -> tuple[tuple[float, float], tuple[Real, Real]]:
+    """Return the first part other than 0 of signals (signals, 2) that turn with the arm, and all parts over it.
+
+    Each is a middle and a radius; without such a signal the unit is 1.
+    """
+    turning = np.argwhere(middle.T)
+    if not turning.size:
+        return (1.0, 0.0), (0 * middle, 0 * radius)
+    order, signal = turning[0]
+    unit = middle[signal, order]
+    unit_radius = radius[signal, order]
+    ratio = middle / unit
+    ratio_radius = (radius + abs(ratio) * unit_radius) / (abs(unit) - unit_radius)
+    ratio_radius[signal, order] = 0.0
+    return (unit, unit_radius), (ratio, ratio_radius)
+
+
 def uncertain_loop(plant: EnclosedPlant, sampling: Sampling, in_z: LawInZ) -> UncertainLoop:
     """Return the loop of a plant and a law; outputs are the signals of the law, and the root moment.
 
@@ -119,18 +136,7 @@ def uncertain_loop(plant: EnclosedPlant, sampling: Sampling, in_z: LawInZ) -> Un
     own, read, row, through = in_z.matrices
     law = slice(oldest + 1, oldest + 1 + len(own))
     middle, radius = plant.at_rest
-    turning = np.argwhere(middle[:, :2].T)
-    unit = 1.0
-    unit_radius = 0.0
-    ratio = 0 * middle[:, :2]
-    ratio_radius = 0 * radius[:, :2]
-    if turning.size:
-        order, signal = turning[0]
-        unit = middle[signal, order]
-        unit_radius = radius[signal, order]
-        ratio = middle[:, :2] / unit
-        ratio_radius = (radius[:, :2] + abs(ratio) * unit_radius) / (abs(unit) - unit_radius)
-        ratio_radius[signal, order] = 0.0
+    (unit, unit_radius), (ratio, ratio_radius) = turning_unit(middle[:, :2], radius[:, :2])
     ramps = np.array([(T - late) ** 2 / 2, T - late])
     before = np.array([late * (T - late / 2), late])
 

@@ -3,6 +3,7 @@
 - `writing`: from records to a folder of pages, the index, and the page of a comparison
 - `sections`: the sections of an arm's pages in their order, and the page that has each
 - `page`: the records that a page asks for
+- `arm_file`: the file of a page's arm, and the command that writes the page again
 - `blocks`: texts, pictures and tables as a page has them
 - `overview`: the first page of an arm, and its row in the index
 - `response_sections`: the arm, its modes, responses and fits

@@ -8,15 +8,12 @@ A page asks here for
 The rooms below compute these records.  Sections and pictures read them.
 """
 
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
 from tfarm.arm import MOMENT_GAIN, RATE_GAIN, AnyLaw, Arm, HubFeedback, Theory, load, presets
-from tfarm.arm.chain import MOST_DELAY, file_text
-from tfarm.arm.writing import law_toml
+from tfarm.arm.chain import MOST_DELAY
 from tfarm.assessment.card import ResultCard, margins_of, result_card, sampled_of
 from tfarm.assessment.card import loop_function as loop_curve
 from tfarm.assessment.step import Step, step
@@ -27,7 +24,7 @@ from tfarm.case import Case, OfCase
 from tfarm.dsp import Chain, Simulation, load_chain, results, traces
 from tfarm.dsp.discretise import acting_law
 from tfarm.dsp.scenarios import TRIAL_SLEWS
-from tfarm.errors import ConvergenceError, ParameterError, one_line
+from tfarm.errors import ConvergenceError, one_line
 from tfarm.exported.live_loop import LiveNumbers, live_data
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import ARMS, Fit, ResponseBand, ShareOfArms, arms_drawn, response_band, stable_share
@@ -472,35 +469,6 @@ def sign_words(arm: Arm) -> str:
     return prose("signs", law=sign_of(arm))
 
 
-# ------------------------------------------------------------ the file and the command of a page
-
-
 def is_preset(arm: Arm, chain: Chain) -> bool:
     """Whether the arm comes with tfarm, and its chain is the one that comes with it."""
     return arm.name in presets() and (load(arm.name), load_chain(arm.name)) == (arm, chain)
-
-
-def file_of(report: ArmReport) -> str:
-    """Return the arm's file with its chain, and with the law that the page is about where TOML can say that alone."""
-    law = own_law(report)
-    if law is None:
-        return file_text(report.arm, report.chain)
-    return f"{file_text(report.cases[0].arm, report.chain)}\n{law}"
-
-
-def own_law(report: ArmReport) -> str | None:
-    """Return the table [law] of the one law of a page; None of none or several, or of one with files of its own."""
-    with suppress(ParameterError):
-        if len(report.laws) == 1 and report.laws[0].measured is None:
-            return law_toml(report.cases[0].law)
-    return None
-
-
-def command_of(report: ArmReport, only: str) -> str:
-    """The command that writes this page; an arm that is no preset is named by its file, as are laws with theirs."""
-    law = own_law(report)
-    options = [] if law is not None else [f"--law {shlex.quote(each.file or 'FILE')}" for each in report.laws]
-    options += [f"--measured {shlex.quote(f'{each.name}={each.source}')}" for each in report.measured]
-    options += [f"--only {only}"] * bool(only) + ["--paper"] * report.is_paper
-    name = argument(report.arm.name, law is None and is_preset(report.arm, report.chain))
-    return " ".join(["tfarm report", name, *options, "--out reports"])

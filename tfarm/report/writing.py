@@ -22,6 +22,7 @@ from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import Fit
 from tfarm.plots.regions import comparison
 from tfarm.processes import share_tasks
+from tfarm.report.arm_file import command_of, file_of
 from tfarm.report.blocks import (
     PageSection,
     explain_commands,
@@ -37,7 +38,7 @@ from tfarm.report.blocks import (
 )
 from tfarm.report.live import ASSETS, LIVE_PAGE, is_live, save_live, write_assets
 from tfarm.report.overview import SHORT, Card, blocks, save_card, summary
-from tfarm.report.page import ArmReport, GivenLaw, command_of, file_of, gather
+from tfarm.report.page import ArmReport, GivenLaw, gather
 from tfarm.report.sections import QUESTIONS, Task, make_section, pieces_of
 from tfarm.report.trust import TRUST_FOLDER, save_proof, write_trust, written_proofs
 from tfarm.schema import quantities, table

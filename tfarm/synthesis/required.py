@@ -166,12 +166,8 @@ class RequirementTask:
             else:
                 found = search(worst, form, self.tell, near, effort if attempt == 0 else "near")
                 if attempt == 0 and effort == "whole" and found.found[0][0] < LOST:
-                    score, x = found.found[0]
-                    least = score + goal.below_models
-                    if max(simulated_scores(goal, judges)(form.record_at(x))) < least + SAME:
-                        share = 0.25
-                    else:
-                        found = found._replace(found=by_slews(goal, judges, found))
+                    least = found.found[0][0] + goal.below_models
+                    found, share = _ranked_by_slews(goal, judges, found, least)
             form = found.form
             law = form.record_at(found.found[0][1])
             if found.found[0][0] >= LOST:
@@ -412,6 +408,19 @@ def violation_by_models(judge: Judge, choice: RequiredLaw) -> float:
             float(each.violations(loop.of(each.name))[0]) for each in wanted if each.measure.is_of(number)
         ]
     return max(found)
+
+
+def _ranked_by_slews(
+    goal: Goal, judges: tuple[Judge, ...], found: Search, least: float
+) -> tuple[Search, float]:
+    """Return a search in the order of slews, and the share of a simplex from its best law.
+
+    No score with a slew is below the `least`: where the best law on the models has it, a quarter of one is enough.
+    """
+    law = found.form.record_at(found.found[0][1])
+    if max(simulated_scores(goal, judges)(law)) < least + SAME:
+        return found, 0.25
+    return found._replace(found=by_slews(goal, judges, found)), 1.0
 
 
 def is_active(checked: Checked) -> bool:
