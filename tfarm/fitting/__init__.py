@@ -5,6 +5,7 @@
 `resonances`: poles fitted to the peaks of a response.
 `decays`: frequencies and damping ratios of a decay.
 `ratio`: the exact response of one signal over another.
+`runs`: records of a rig in motion, in open or closed loop.
 `overlay`: a measured response compared with the exact one, mode by mode.
 `model`: free numbers of an arm, and the residuals that they leave.
 `solve`: the search for the least sum of squares.

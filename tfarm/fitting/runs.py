@@ -1,0 +1,119 @@
+"""Records of a rig in motion: what was commanded, held from a sample to the next, and what was measured.
+
+A record in open loop has the commanded input of the plant.  One in closed loop has the references of the controller
+that was running, and that controller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tfarm.arm import AT_HUB, Arm, Law
+from tfarm.arm.law import REFERENCE, as_law
+from tfarm.arrays import Real
+from tfarm.errors import MISSING, require
+from tfarm.exact.outputs import OUTPUTS
+from tfarm.fitting.data import check_signal
+from tfarm.records import frozen
+
+if TYPE_CHECKING:
+    from tfarm.fitting.recording import Recording
+
+
+@frozen(kw_only=True)
+class Run:
+    """A record of a rig in motion at samples every `period` [s], all arrays (n,) in SI units.
+
+    `outputs` are measured signals by name ("hub_angle", "root_moment", "strain@0.05"), `input` is the commanded input
+    of the plant, held from each sample to the next.  Under a `law` it may be left out, and `references` of the
+    hub's angle, rate or moment take its place; a `law` that is None is an open loop.
+    `sigma` has the standard deviations of outputs that are known; others follow from the residuals.
+    Raises ParameterError for arrays of other lengths, values that are no numbers, and a record without outputs, without
+    input and references, or of an open loop without an input.
+    """
+
+    period: float
+    outputs: Mapping[str, Real]
+    input: Real | None = None
+    references: Mapping[str, Real] = field(default_factory=dict)
+    law: Law | None = None
+    sigma: Mapping[str, float] = field(default_factory=dict)
+    source: str = "array"
+    digest: str = ""
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        require(self.outputs, "outputs", MISSING, "name at least one measured signal of the record")
+        columns: dict[str, Any] = {**self.outputs}
+        columns |= {f"{REFERENCE}{name}": value for name, value in self.references.items()}
+        if self.input is not None:
+            columns["input"] = self.input
+        for name, values in columns.items():
+            remedy = f"one number for each of the {self.count} samples"
+            require(np.shape(values) == (self.count,), name, np.shape(values), remedy)
+            require(np.isfinite(values).all(), name, "nan or inf", "finite numbers; cut the record there")
+        for name in self.outputs:
+            check_signal(name, "output")
+        for name in self.references:
+            require(name in AT_HUB, "reference", name, f"of one of {', '.join(AT_HUB)}")
+        for name, value in self.sigma.items():
+            require(name in self.outputs and value > 0, f"sigma of {name}", value, "positive, of an output")
+        if self.law is None:
+            remedy = (
+                "an open loop has its commanded input; of a closed one give the controller that was running"
+            )
+            require(self.input is not None, "input", MISSING, remedy)
+        else:
+            object.__setattr__(self, "law", as_law(self.law))
+            remedy = "a closed loop has a reference: a column reference:hub_angle, for instance"
+            require(self.references or self.input is not None, "references", MISSING, remedy)
+
+    @property
+    def count(self) -> int:
+        """Samples of each signal."""
+        return int(np.size(next(iter(self.outputs.values()))))
+
+    @property
+    def t(self) -> Real:
+        """The times of the samples [s], from 0 on."""
+        return np.asarray(self.period * np.arange(self.count))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The measured signals."""
+        return tuple(self.outputs)
+
+
+def run_of(recording: Recording, arm: Arm, law: Law | None = None) -> Run:
+    """Return the run that a record has of an arm: its columns by their names.
+
+    The column of the arm's input ("hub_torque", "motor_current") is the commanded input, "reference:hub_angle" a
+    reference, and every other column with the name of a signal is an output; the rest is left out.
+    Raises ParameterError as `Run` does.
+    """
+    columns = recording.signals
+    driven = arm.input if law is None or law.input is None else law.input
+    outputs = {}
+    for name, values in columns.items():
+        plain = name.partition("@")[0]
+        if name != driven and not name.startswith(REFERENCE) and plain in OUTPUTS:
+            outputs[name] = values
+    remedy = f"a column of a signal, such as hub_angle, besides {driven}"
+    require(outputs, "record", recording.source, remedy, recording.source)
+    references = {
+        name.removeprefix(REFERENCE): values for name, values in columns.items() if name.startswith(REFERENCE)
+    }
+    return Run(
+        period=recording.period,
+        outputs=outputs,
+        input=columns.get(driven),
+        references=references if law is not None else {},
+        law=law,
+        source=recording.source,
+        digest=recording.digest,
+        note=recording.note,
+    )
