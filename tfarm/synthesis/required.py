@@ -237,8 +237,8 @@ class RequirementTask:
         # of a violation: what is farther from its limit is not active
         near = 0.1
         is_other = [each.name != DELAY for each in self.requirements]
-        # of simplices to either side, each begun at the end of the one before; one where a slew takes longer
-        sizes = (0.5, -0.5, 0.2) if chosen.search.form.size <= 2 else (0.5,)
+        # of simplices to either side, the second begun at the end of the first; one where a slew takes longer
+        sizes = (0.5, -0.5) if chosen.search.form.size <= 2 else (0.5,)
         value = self._aim(judges, chosen)
         for size in sizes:
             if value < least + SAME:
