@@ -183,8 +183,7 @@ def of_parquet_columns(path: str) -> Iterator[memoryview]:
         table = file.read()
     for field, column in zip(table.schema, table.columns, strict=True):
         if pyarrow.types.is_integer(field.type) or pyarrow.types.is_floating(field.type):
-            written = field.metadata or {}
-            unit = written.get(b"unit", written.get(b"units", b""))
+            unit = (field.metadata or {}).get(b"unit")
             found[field.name + _unit_suffix(unit)] = column.to_numpy()
     return pack_arrays(found)
 

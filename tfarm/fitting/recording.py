@@ -7,8 +7,9 @@ A run measured on a rig under a controller is compared with the exact sampled lo
     [measured]
     file = "step.csv"                    # in the folder of the law's file
     source = "laboratory X, run 7"       # shown with it
+    signals = ["hub_angle=enc[deg]"]     # its columns, if they have other names or units
 
-The record (a .csv, or a .mat file) has a column `t` [s], one `reference:hub_angle` [rad], the reference of the
+The record has a column `t` [s], one `reference:hub_angle` [rad], the reference of the
 controller, and one for each of `hub_angle` [rad] and `root_moment` [N m] that was measured.
 """
 
@@ -18,6 +19,7 @@ from dataclasses import field, replace
 from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 
 from tfarm.arm.chain import TIME_ROUNDING
 from tfarm.arm.reading import AnyFile, load_tables
@@ -269,6 +271,7 @@ class RunTable(StrictTable):
 
     file: str
     source: str = ""
+    signals: list[str] = Field(default_factory=list)
 
 
 @frozen
@@ -360,7 +363,7 @@ def load_run(name_or_path: AnyFile) -> MeasuredRun | None:
         return None
     with name_file(file):
         table = validate_table(RunTable, tables["measured"], "measured")
-        found = read_recording(Path(file).parent / table.file)
+        found = read_recording(Path(file).parent / table.file, table.signals)
         reference = found.signal("reference:hub_angle", "measured.file")
         require(
             {"hub_angle", "root_moment"} & found.signals.keys(),

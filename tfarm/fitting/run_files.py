@@ -87,8 +87,8 @@ def check_law(law: Law, run: Run, file: str) -> None:
     driving = np.array([columns[name][first] for name in (*own.signals, *own.wanted)])
     share = unexplained(own, driving, run.input[first])
     remedy = (
-        f"driven by the record's {', '.join(own.signals)} it leaves {100 * share:.3g} % of {run.source}'s input "
-        f"unexplained, of {100 * most:g} % at most: another law was running, or a sign or unit of a column is wrong"
+        f"driven by the record's {', '.join(own.signals)} it leaves {100 * share:.3g} % of its input unexplained, "
+        f"of {100 * most:g} % at most: another law was running, or a sign or unit of a column is wrong"
     )
     require(share <= most, "law", file, remedy)
 
