@@ -88,7 +88,8 @@ def check_law(law: Law, run: Run, file: str) -> None:
     share = unexplained(own, driving, run.input[first])
     remedy = (
         f"driven by the record's {', '.join(own.signals)} it leaves {100 * share:.3g} % of its input unexplained, "
-        f"of {100 * most:g} % at most: another law was running, or a sign or unit of a column is wrong"
+        f"of {100 * most:g} % at most: another law was running, a sign or unit of a column is wrong, or "
+        "the law reads other signals than these: then leave the input out with --signal"
     )
     require(share <= most, "law", file, remedy)
 
