@@ -25,7 +25,7 @@ import numpy as np
 
 from tfarm.arm import Arm, must_be_arm, must_have_free_hub
 from tfarm.arm.chain import Chain, chain_or_usual
-from tfarm.arm.checks import positive
+from tfarm.arm.checks import above_zero, positive
 from tfarm.arrays import Real
 from tfarm.dsp.simulate import quantisers
 from tfarm.errors import MISSING, did_you_mean, require
@@ -44,14 +44,6 @@ from tfarm.stopping import Progress
 INPUT = "input"
 
 
-class SensorNoise(NamedTuple):
-    """The noise of a measured signal, white."""
-
-    signal: Annotated[str, Quantity("signal", help="measured signal of the record")]
-    sigma: Annotated[float, Quantity("standard deviation", digits=4, help="of its noise, in SI units")]
-    source: Annotated[str, Quantity("noise by", help="given, or by the step of the converter in the chain")]
-
-
 class RankedInput(NamedTuple):
     """An excitation with the information of its record; `intervals` are in the order of the free numbers."""
 
@@ -65,12 +57,6 @@ class RankedInput(NamedTuple):
         float,
         Quantity(
             "ln det(1 + F)", digits=4, help="F: Fisher information of the logarithms of the free numbers"
-        ),
-    ]
-    wider: Annotated[
-        float,
-        Quantity(
-            "intervals", "× best", 3, "geometric mean of all intervals over that of the best excitation"
         ),
     ]
     intervals: Annotated[
@@ -94,9 +80,11 @@ class Experiment:
     limits: Annotated[
         Mapping[str, float], Quantity("limits", digits=4, help="of the input and of signals, in SI units")
     ]
-    sensors: Annotated[
-        tuple[SensorNoise, ...], Quantity("measured signals", help="signals of the record, and their noise")
+    noise: Annotated[
+        Mapping[str, float],
+        Quantity("noise", digits=4, help="standard deviation of each measured signal's noise, in SI units"),
     ]
+    best: Annotated[str, Quantity("best excitation", help="excitation of the most information of the family")]
     ranked: Annotated[
         tuple[RankedInput, ...], Quantity(key="excitations", help="all excitations, the best first")
     ]
@@ -119,18 +107,6 @@ class Experiment:
     def arm_name(self) -> Annotated[str, Quantity("arm", help="arm at whose numbers all is computed")]:
         """The arm."""
         return self.arm.name
-
-    @property
-    def best(
-        self,
-    ) -> Annotated[str, Quantity("best excitation", help="excitation of the most information of the family")]:
-        """The excitation of the most information."""
-        return self.ranked[0].excitation
-
-    @property
-    def duration(self) -> Annotated[float, Quantity("duration", "s", help="length of the record")]:
-        """The length of the record [s]."""
-        return self.period * self.input.size
 
     @property
     def t(self) -> Real:
@@ -178,9 +154,9 @@ def experiment(
     must_have_free_hub(arm)
     chain = chain_or_usual(chain)
     limits = limits_of(arm, chain, limit, angle, rate)
-    sensors = noise_of_sensors(chain, outputs, noise or {})
+    deviations = noise_of_sensors(chain, outputs, noise or {})
     shapes = excitations(arm, duration, chain.sampling.period)
-    problem = problem_at_rest(arm, free, sensors, chain, next(iter(shapes.values())).size)
+    problem = problem_at_rest(arm, free, deviations, chain, next(iter(shapes.values())).size)
     rows: list[RankedInput] = []
     for number, (name, shape) in enumerate(shapes.items()):
         if progress is not None:
@@ -188,23 +164,20 @@ def experiment(
         signals = scaled_signals(problem, shape, limits)
         rows.append(ranked_input(name, solution_under(problem, signals), signals))
     rows.sort(key=lambda row: row.information, reverse=True)
-    best = rows[0]
-    signals = scaled_signals(problem, shapes[best.excitation], limits)
+    best = rows[0].excitation
+    signals = scaled_signals(problem, shapes[best], limits)
     numbers, words = confidence_intervals(solution_under(problem, signals), profile=False)
-    ranked = []
-    for row in rows:
-        wider = math.exp((best.information - row.information) / (2 * len(numbers)))
-        ranked.append(row._replace(wider=wider))
     return Experiment(
         arm=arm,
         period=chain.sampling.period,
         limits={name: value for name, value in limits.items() if value < math.inf},
-        sensors=sensors,
-        ranked=tuple(ranked),
+        noise=deviations,
+        best=best,
+        ranked=tuple(rows),
         numbers=numbers,
         not_determined=words,
         input=signals[INPUT],
-        outputs={each.signal: signals[each.signal] for each in sensors},
+        outputs={name: signals[name] for name in deviations},
     )
 
 
@@ -216,59 +189,60 @@ def limits_of(arm: Arm, chain: Chain, limit: float | None, angle: float, rate: f
         most = min(most, positive("--limit", limit, f"a positive number of {arm.input_unit}"))
     remedy = f"give the largest {arm.input} [{arm.input_unit}], or [actuator] torque_limit of the chain"
     require(most < math.inf, "--limit", MISSING, remedy)
-    require(angle > 0, "--angle", angle, "a positive number of rad")
-    require(rate > 0, "--rate", rate, "a positive number of rad/s")
-    return {INPUT: most, "hub_angle": angle, "hub_rate": rate, "root_moment": most_moment}
+    return {
+        INPUT: most,
+        "hub_angle": above_zero("--angle", angle, "a positive number of rad"),
+        "hub_rate": above_zero("--rate", rate, "a positive number of rad/s"),
+        "root_moment": most_moment,
+    }
 
 
-def noise_of_sensors(
-    chain: Chain, outputs: Sequence[str], given: Mapping[str, float]
-) -> tuple[SensorNoise, ...]:
-    """Return the noise of each signal: as given, else that of rounding to the steps of its converter."""
+def noise_of_sensors(chain: Chain, outputs: Sequence[str], given: Mapping[str, float]) -> dict[str, float]:
+    """Return the deviation of each signal's noise: as given, else that of rounding to the steps of its converter."""
     encoder, moment, _ = quantisers(chain)[:, 0].tolist()
     steps = {"hub_angle": encoder, "root_moment": moment}
     require(outputs, "--outputs", MISSING, "name what is measured, such as hub_angle,root_moment")
     for name in given:
         require(name in outputs, "--noise", name, f"is not measured; {did_you_mean(name, outputs)}")
-    found = []
-    for name in dict.fromkeys(outputs):
+    found = {}
+    for name in outputs:
         check_signal(name, "--outputs")
-        sigma = given.get(name, steps.get(name, 0.0) / math.sqrt(12))
         remedy = f"give its standard deviation, --noise {name}=NUMBER: the chain has no steps for it"
-        is_known = name in given or sigma > 0
-        require(is_known, f"noise of {name}", MISSING, remedy)
-        positive(f"noise of {name}", sigma, "a standard deviation above 0, in SI units")
-        found.append(SensorNoise(name, sigma, "given" if name in given else "step of its converter"))
-    return tuple(found)
+        require(name in given or steps.get(name), f"noise of {name}", MISSING, remedy)
+        sigma = given.get(name, steps.get(name, 0.0) / math.sqrt(12))
+        found[name] = positive(f"noise of {name}", sigma, "a standard deviation above 0, in SI units")
+    return found
 
 
 def excitations(arm: Arm, duration: float, period: float) -> dict[str, Real]:
     """Return the family, held inputs (n,) by name, each less its mean and its trend.
 
     These are binary sequences, multisines with the phases of Schroeder (1970), and linear sweeps, for each of the first
-    three modes below 0.9 of half the sampling rate, and two double steps.
+    three modes below 0.9 of half the sampling rate, and double steps of half its period or of the whole record.
     """
     from scipy.signal import chirp, detrend, max_len_seq
 
     # of one signal: more are decimated first
     most = 100_000
     fastest = 0.45 / period
-    tops = flexible_frequencies(arm, 2 * math.pi * fastest)[:3] / (2 * math.pi)
-    if not tops.size:
-        tops = np.array([0.2 / period])
+    # of the first modes, or of some oscillation where none is slow enough
+    tops = flexible_frequencies(arm, 2 * math.pi * fastest)[:3].tolist() or [0.4 * math.pi / period]
     count = round(positive("--duration", duration, "a positive number of seconds") / period)
-    least = math.ceil(max(64.0, 2 / (tops[0] * period)))
+    least = math.ceil(max(64.0, 4 * math.pi / (tops[0] * period)))
     remedy = f"{least * period:.4g} to {most * period:g} s: two periods of mode 1, 64 to {most} samples"
     require(least <= count <= most, "--duration", duration, remedy)
     t = period * np.arange(count)
     lines = np.fft.rfftfreq(count, period)
     found = {}
-    # half a period of each mode
-    halves = [max(1, round(0.5 / (top * period))) for top in tops.tolist()]
-    for top, half in zip(tops.tolist(), halves, strict=True):
+    for top in np.divide(tops, 2 * math.pi).tolist():
+        # samples of half a period
+        half = max(1, round(0.5 / (top * period)))
         bits = math.ceil(count / half)
         sequence, _ = max_len_seq(max(2, bits.bit_length()), length=bits)
         found[f"PRBS, bits of {half * period:.3g} s"] = np.repeat(2.0 * sequence - 1, half)[:count]
+        for width in (half, count // 4):
+            pulses = np.repeat([1.0, -1.0, -1.0, 1.0], width)[:count]
+            found[f"double step, {width * period:.3g} s each way"] = np.pad(pulses, (0, count - pulses.size))
         for low in (float(lines[1]), top / 1.5):
             high = min(1.5 * top, fastest)
             band = f"{low:.3g} to {high:.3g} Hz"
@@ -278,16 +252,13 @@ def excitations(arm: Arm, duration: float, period: float) -> dict[str, Real]:
             spectrum[kept] = np.exp(-1j * math.pi * k * (k - 1) / k.size)
             found[f"multisine, {band}"] = np.fft.irfft(spectrum, count)
             found[f"sweep, {band}"] = chirp(t, low, t[-1], high, phi=-90)
-    for width in {count // 4, min(halves[0], count // 4)}:
-        pulses = np.repeat([1.0, -1.0, -1.0, 1.0], width)
-        found[f"double step, {width * period:.3g} s each way"] = np.pad(pulses, (0, count - pulses.size))
     return {name: detrend(shape) for name, shape in found.items()}
 
 
 def problem_at_rest(
-    arm: Arm, free: Sequence[str], sensors: Sequence[SensorNoise], chain: Chain, count: int
+    arm: Arm, free: Sequence[str], noise: Mapping[str, float], chain: Chain, count: int
 ) -> Problem:
-    """Return the fit of the free numbers to a record of the sensors, without motion yet."""
+    """Return the fit of the free numbers to a record of signals with that noise, without motion yet."""
     if DRIVE_GAIN in free:
         arm, _ = commanded(arm, ())
     keys = [GAIN_KEY if key == DRIVE_GAIN else key for key in free]
@@ -297,9 +268,9 @@ def problem_at_rest(
     rest = np.zeros(count)
     run = Run(
         period=chain.sampling.period,
-        outputs=dict.fromkeys([each.signal for each in sensors], rest),
+        outputs=dict.fromkeys(noise, rest),
         input=rest,
-        sigma={each.signal: each.sigma for each in sensors},
+        sigma=noise,
     )
     problem = with_run_numbers(
         Problem(family, numbers, (), (), (fit_run(arm, run, chain),)), keys, {}, {}, {}
@@ -342,7 +313,7 @@ def solution_under(problem: Problem, signals: Mapping[str, Real]) -> Solution:
 
 
 def ranked_input(name: str, found: Solution, signals: Mapping[str, Real]) -> RankedInput:
-    """Return the row of an excitation, its intervals as wide as those of the best."""
+    """Return the row of an excitation: the fit that its record is taken for, and what moves."""
     sizes, axes = principal_axes(found.jacobian)
     reach = found.quantile / np.maximum(sizes, 1e-30)
     shares = np.linalg.norm(axes * reach[:, None], axis=0).tolist()
@@ -353,6 +324,5 @@ def ranked_input(name: str, found: Solution, signals: Mapping[str, Real]) -> Ran
         hub_angle=largest(signals["hub_angle"]),
         end_angle=float(signals["hub_angle"][-1]),
         information=float(np.log1p(sizes**2).sum()),
-        wider=1.0,
         intervals={each.key: share if share < 1 else None for each, share in pairs},
     )

@@ -317,9 +317,9 @@ def draw_experiment(found: Experiment, *, ax: Sequence[Axes]) -> None:
     over_time(upper, found.t, _input_label(found.arm))
     upper.step(found.t, found.input, where="post", color=INK, lw=0.8)
     over_time(middle, found.t, "signal over its noise [−]")
-    for sensor, colour in zip(found.sensors, cycle(COLOURS), strict=False):
-        values = found.outputs[sensor.signal] / sensor.sigma
-        middle.plot(found.t, values, color=colour, lw=1.0, label=signal_words(sensor.signal)[0])
+    for (name, sigma), colour in zip(found.noise.items(), cycle(COLOURS), strict=False):
+        values = found.outputs[name] / sigma
+        middle.plot(found.t, values, color=colour, lw=1.0, label=signal_words(name)[0])
     sizes = 2 * abs(np.fft.rfft(found.input)) / found.input.size
     lower.plot(np.fft.rfftfreq(found.input.size, found.period), sizes, color=BLUE, lw=1.0)
     for omega in flexible_frequencies(found.arm, math.pi / found.period).tolist():
