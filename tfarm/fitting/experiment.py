@@ -62,7 +62,7 @@ class RankedInput(NamedTuple):
     intervals: Annotated[
         Mapping[str, float | None],
         Quantity(
-            help="half of each 95 % interval over the number, of drive.delay over a sample; none beyond 1"
+            help="half of each 95 % interval over the number, of drive.delay over a sample; none where it is open"
         ),
     ]
 
@@ -157,23 +157,23 @@ def experiment(
     deviations = noise_of_sensors(chain, outputs, noise or {})
     shapes = excitations(arm, duration, chain.sampling.period)
     problem = problem_at_rest(arm, free, deviations, chain, next(iter(shapes.values())).size)
-    rows: list[RankedInput] = []
+    found = []
     for number, (name, shape) in enumerate(shapes.items()):
         if progress is not None:
             progress(number, len(shapes), name)
         signals = scaled_signals(problem, shape, limits)
-        rows.append(ranked_input(name, solution_under(problem, signals), signals))
-    rows.sort(key=lambda row: row.information, reverse=True)
-    best = rows[0].excitation
-    signals = scaled_signals(problem, shapes[best], limits)
-    numbers, words = confidence_intervals(solution_under(problem, signals), profile=False)
+        solution = solution_under(problem, signals)
+        numbers, words = confidence_intervals(solution, profile=False)
+        found.append((ranked_input(name, solution, numbers, signals), numbers, words, signals))
+    found.sort(key=lambda each: each[0].information, reverse=True)
+    best, numbers, words, signals = found[0]
     return Experiment(
         arm=arm,
         period=chain.sampling.period,
         limits={name: value for name, value in limits.items() if value < math.inf},
         noise=deviations,
-        best=best,
-        ranked=tuple(rows),
+        best=best.excitation,
+        ranked=tuple(row for row, *_ in found),
         numbers=numbers,
         not_determined=words,
         input=signals[INPUT],
@@ -312,17 +312,20 @@ def solution_under(problem: Problem, signals: Mapping[str, Real]) -> Solution:
     return Solution(problem, start, problem.residuals(start), problem.jacobian(start), True, 1)
 
 
-def ranked_input(name: str, found: Solution, signals: Mapping[str, Real]) -> RankedInput:
-    """Return the row of an excitation: the fit that its record is taken for, and what moves."""
-    sizes, axes = principal_axes(found.jacobian)
-    reach = found.quantile / np.maximum(sizes, 1e-30)
-    shares = np.linalg.norm(axes * reach[:, None], axis=0).tolist()
-    pairs = zip(found.problem.parameters, shares, strict=True)
+def ranked_input(
+    name: str, found: Solution, numbers: Sequence[Fitted], signals: Mapping[str, Real]
+) -> RankedInput:
+    """Return the row of an excitation: the fit that its record is taken for, its numbers, and what moves."""
+    sizes, _ = principal_axes(found.jacobian)
+    intervals: dict[str, float | None] = {}
+    for each, of in zip(numbers, found.problem.parameters, strict=True):
+        scale = found.quantile / (of.size or abs(each.value))
+        intervals[each.key] = None if each.deviation is None else scale * each.deviation
     return RankedInput(
         excitation=name,
         peak=largest(signals[INPUT]),
         hub_angle=largest(signals["hub_angle"]),
         end_angle=float(signals["hub_angle"][-1]),
         information=float(np.log1p(sizes**2).sum()),
-        intervals={each.key: share if share < 1 else None for each, share in pairs},
+        intervals=intervals,
     )
