@@ -26,6 +26,7 @@ from tfarm.exported import export as export
 from tfarm.face import CaseFace
 from tfarm.fitting.data import Measured as Measured
 from tfarm.fitting.data import read_measured as read_measured
+from tfarm.fitting.experiment import experiment as experiment
 from tfarm.fitting.fit import fit as fit
 from tfarm.fitting.overlay import overlay as overlay
 from tfarm.fitting.recording import read_recording as read_recording

@@ -20,13 +20,16 @@ from tfarm.assessment.step import Step
 from tfarm.digits import how_many, plain, significant
 from tfarm.dsp import Simulation, traces
 from tfarm.dsp.results import Run
-from tfarm.exact.outputs import OUTPUTS
+from tfarm.exact.outputs import OUTPUTS, signal_words
+from tfarm.fitting.experiment import Experiment
 from tfarm.fitting.recording import RunComparison
 from tfarm.loop.circle_crossings import GainMap
 from tfarm.loop.plane import Plane
+from tfarm.plots.frequency import along_hertz
 from tfarm.plots.regions import gain_regions
 from tfarm.plots.style import (
     BLUE,
+    COLOURS,
     DASHED,
     DOTTED,
     FAINT,
@@ -49,6 +52,7 @@ from tfarm.plots.style import (
 )
 from tfarm.schema import text
 from tfarm.spectrum import Modes
+from tfarm.spectrum.table import flexible_frequencies
 from tfarm.tuner import LearningCurves, Tuning
 
 ALONG = "distance from the hub, x [m]"
@@ -299,6 +303,29 @@ def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes])
             if seen.size:
                 one.plot(measured.t, seen, color=ORANGE, label="measured")
             one.plot(run.t, computed, color=BLUE, lw=1.2, label="exact sampled loop")
+
+
+@picture(
+    (Experiment, "tfarm.experiment returns"),
+    size=(9.0, 7.0),
+    title=lambda found: f"{found.arm.name}: {found.best}",
+    grid=lambda figure, _: figure.subplots(3),
+)
+def draw_experiment(found: Experiment, *, ax: Sequence[Axes]) -> None:
+    """Draw the best excitation, the signals under it over their noise, and its spectrum with the arm's frequencies."""
+    upper, middle, lower = ax
+    over_time(upper, found.t, _input_label(found.arm))
+    upper.step(found.t, found.input, where="post", color=INK, lw=0.8)
+    over_time(middle, found.t, "signal over its noise [−]")
+    for (name, sigma), colour in zip(found.noise.items(), cycle(COLOURS), strict=False):
+        values = found.outputs[name] / sigma
+        middle.plot(found.t, values, color=colour, lw=1.0, label=signal_words(name)[0])
+    sizes = 2 * abs(np.fft.rfft(found.input)) / found.input.size
+    lower.plot(np.fft.rfftfreq(found.input.size, found.period), sizes, color=BLUE, lw=1.0)
+    for omega in flexible_frequencies(found.arm, math.pi / found.period).tolist():
+        lower.axvline(omega / (2 * math.pi), color=INK, lw=0.8, ls=DOTTED)
+    amplitude = f"amplitude [{found.arm.input_unit}]"
+    along_hertz(lower, "linear", xlim=(0.0, 0.5 / found.period), ylabel=amplitude)
 
 
 @picture(
