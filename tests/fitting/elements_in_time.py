@@ -1,6 +1,6 @@
 """A sampled rig of finite elements (`tests.chain_elements`) in time, for the tests only: it has nothing of tfarm.
 
-    x' = A x + B (gain u(t - delay) + bias),    y = C x + D (...),    x exact between the samples
+    x' = A x + B (gain u(t - delay) + bias),    y = C x,    x exact between the samples
 
 The computer's u is held from a sample to the next.  Signals are read just before a sample, each with its offset, noise
 and steps, and a law is a difference equation of each of its signals, e = reference - signal:
@@ -35,7 +35,7 @@ class Body:
 
 
 class Plant:
-    """A, B, C, D of a rig from its input to signals, through a first-order filter of that corner [rad/s]."""
+    """A, B, C of a rig from its input to signals, through a first-order filter of that corner [rad/s]."""
 
     def __init__(self, arm, names, up_to, *, body=None, corner=math.inf):
         loop = RigLoop(arm, up_to)
@@ -43,28 +43,25 @@ class Plant:
         if body is not None:
             _hang(loop, output("payload_displacement", 1.0) @ full, body.share * arm.payload.mass, body)
         A, B, rows = loop.state_space()
-        C, D = [], []
+        C = []
         for name in names:
             row = np.zeros(len(loop.K))
             row[: full.shape[1]] = output(name, 1.0) @ full
             still, rate = rows(row)
-            order = ORDER.get(name, 0)
-            C.append((still, rate, rate @ A)[order])
-            D.append(rate @ B if order == 2 else 0.0)
+            # waves take their time: no signal follows the torque at once
+            C.append((still, rate, rate @ A)[ORDER.get(name, 0)])
         self.names = tuple(names)
-        self.A, self.B, self.C, self.D = A, B, np.array(C), np.array(D)
+        self.A, self.B, self.C = A, B, np.array(C)
         if math.isfinite(corner):
             self._filter([n for n, name in enumerate(names) if name in ANALOG], corner)
 
     def _filter(self, analog, corner):
         """y_f' = corner (y - y_f) of these signals."""
         n, m = len(self.A), len(analog)
-        C, D = self.C[analog], self.D[analog]
-        self.A = np.block([[self.A, np.zeros((n, m))], [corner * C, -corner * np.eye(m)]])
-        self.B = np.r_[self.B, corner * D]
+        self.A = np.block([[self.A, np.zeros((n, m))], [corner * self.C[analog], -corner * np.eye(m)]])
+        self.B = np.r_[self.B, np.zeros(m)]
         self.C = np.hstack([self.C, np.zeros((len(self.C), m))])
         self.C[analog] = np.eye(n + m)[n:]
-        self.D[analog] = 0.0
 
     def slow_states(self, below):
         """A basis (states, k) of the motions in all modes with |s| < below."""
@@ -155,7 +152,7 @@ def simulate(plant, drive, computer, *, start=None, rng=None, factor=1.0, bias=N
     first, of_old = held(plant.A, plant.B, (late - d) * T)
     second, of_new = held(plant.A, plant.B, (1 - late + d) * T)
     whole, of_old = second @ first, (second @ of_old)[:, None]
-    of_new, through = of_new[:, None], plant.D[:, None]
+    of_new = of_new[:, None]
     deviation = np.array([[computer.noise.get(name, 0.0)] for name in names])
     noise = np.zeros((computer.count, len(names), 1))
     if rng is not None:
@@ -166,7 +163,7 @@ def simulate(plant, drive, computer, *, start=None, rng=None, factor=1.0, bias=N
     # the last d + 1 inputs of the drive, the newest first
     queue = [drive.gain * computer.before * factor + bias] * (d + 1)
     for k in range(computer.count):
-        y = plant.C @ x + through * queue[-1] + offset + noise[k]
+        y = plant.C @ x + offset + noise[k]
         for n, step in steps:
             y[n] = np.rint(y[n] / step) * step
         read[:, k] = y

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import tfarm
-from tests.chain_elements import reached
-from tests.fitting.elements_in_time import Body, Computer, Drive, Plant, simulate
+from tests.chain_elements import frequency_response, reached
+from tests.fitting.elements_in_time import ANALOG, Body, Computer, Drive, Plant, simulate
 from tests.fitting.planted import some_arm
 from tests.fitting.planted_runs import KINDS, WRONG, planted
 from tfarm.arm import HubFeedback
@@ -60,11 +60,24 @@ def test_an_open_loop_is_that_of_the_simulator(delay):
     assert max(errors[1:]) < 1e-6
 
 
+def test_signals_and_filter_have_the_responses_of_the_elements():
+    """C (s - A)^-1 B is the elements' own response, times corner/(s + corner) where the signal is analog."""
+    arm = rig(1)
+    w1 = first_frequency(arm)
+    names, corner, s = (*NAMES, "tip_acceleration"), 2.0 * w1, 1.3j * w1
+    plant = Plant(arm, names, reached(arm, 3), corner=corner)
+    found = plant.C @ np.linalg.solve(s * np.eye(len(plant.A)) - plant.A, plant.B)
+    expected = frequency_response(arm, s, names) * np.where(
+        [name in ANALOG for name in names], corner / (s + corner), 1
+    )
+    np.testing.assert_allclose(found, expected, rtol=1e-7)
+
+
 def pd_with_filter(w1, J, T):
-    """A lead law in z of the error of the hub's angle."""
+    """A lead law in z of the error of the hub's angle, and a late one of the moment."""
     wc, pole = 0.15 * w1, math.exp(-2 * w1 * T)
     P, D = J * wc**2, 1.4 * J * wc / T * (1 - pole)
-    return {"hub_angle": ([P + D, -P * pole - D], [1.0, -pole])}
+    return {"hub_angle": ([P + D, -P * pole - D], [1.0, -pole]), "root_moment": ([0.1], [1.0, -0.5])}
 
 
 @pytest.mark.parametrize("kind", ["gains", "filter", "counted"])
