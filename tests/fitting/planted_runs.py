@@ -394,6 +394,11 @@ def is_rejected(row):
     return row["explained"] is False or row["verdict"].startswith("misses")
 
 
+def is_visible(row):
+    """Whether the excess of chi-squared of a wrong model is far beyond the scatter of chi-squared."""
+    return row["excess"] > 5 * math.sqrt(2 * row["samples"] * len(row["signals"]))
+
+
 def coverage(rows):
     """Yield the shares of intervals that have the truth, by number and of all."""
     inside = {}
@@ -427,6 +432,9 @@ def summary(path):
         )
         print(f"  not converged: {[row['seed'] for row in some if not row['converged']]}")
         if kind in WRONG:
+            seen = [row for row in some if is_visible(row)]
+            count = sum(map(is_rejected, seen))
+            print(f"  visible in the record: {len(seen)}, {count} = {count / max(len(seen), 1):.1%} rejected")
             for row in some:
                 if not is_rejected(row):
                     print(f"  {row['seed']} not rejected: {row['verdict']}, excess {row['excess']:.3g}")
