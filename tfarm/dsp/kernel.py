@@ -119,6 +119,23 @@ class State(NamedTuple):
     saturated: NDArray[np.bool_]
 
 
+def rest(model: SampleModel, count: int, delay: int) -> State:
+    """Return the state at rest, with room for a number of samples, under a delay of whole samples."""
+    outputs, poles = model.weights.shape
+    records = int(model.piece[:, -1].sum())
+    return State(
+        amplitude=np.zeros(poles, complex),
+        rigid=np.zeros(2),
+        held=np.zeros(delay + 2),
+        work=np.zeros(2),
+        circle=np.zeros(poles),
+        record=np.zeros((count, outputs)),
+        torque=np.zeros(count),
+        fine=np.zeros((count, records, outputs)),
+        saturated=np.zeros((count, 3), np.bool_),
+    )
+
+
 class Forcing(NamedTuple):
     """Torque fed forward and disturbance torque [N m] at each sample (n,), and an impulse [N m s] after the first."""
 
@@ -288,6 +305,21 @@ def law_step(table: Any, z: Any, feedforward: float, single: bool, out: Any) -> 
     """Set out = table z of z = [x; e]: the next states, and the output, which begins with the feedforward."""
     for i in range(out.size):
         out[i] = add_row_product(table[i], z, feedforward if i == out.size - 1 else 0.0, single)
+
+
+@compiled
+def law_outputs(table: Any, errors: Any) -> Any:
+    """Return the outputs (n,) of a law [x_{k+1}; u] = table [x; e] from rest, of errors (n, columns)."""
+    order = table.shape[0] - 1
+    z = np.zeros(table.shape[1])
+    following = np.zeros(order + 1)
+    found = np.zeros(errors.shape[0])
+    for k in range(found.size):
+        z[order:] = errors[k]
+        law_step(table, z, 0.0, False, following)
+        z[:order] = following[:order]
+        found[k] = following[order]
+    return found
 
 
 @inlined

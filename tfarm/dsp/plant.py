@@ -70,6 +70,13 @@ class Plant:
             self, outputs=names, residues=self.residues[at], rigid=self.rigid[at], static=self.static[at]
         )
 
+    def times(self, factors: Real) -> Plant:
+        """Return the plant with each output times a factor (outputs,)."""
+        by_row = factors[:, None]
+        return replace(
+            self, residues=self.residues * by_row, rigid=self.rigid * by_row, static=self.static * factors
+        )
+
     def join(self, more: Plant) -> Plant:
         """Return the plant with the outputs of another of the same arm, which may lack the filter's pole."""
         # those of the arm, for any output

@@ -101,6 +101,34 @@ class PulseTransfer:
         flat = self.scaled_values(points.ravel(), None, np.ones(points.size))
         return flat.reshape(len(self.plant.outputs), *points.shape)
 
+    def held_response(self, u: Real) -> Real:
+        """Return the outputs (outputs, n) at the samples, before each update, from rest under held torques (n,)."""
+        plant = self.plant
+        from scipy.signal import lfilter
+
+        d = self.sampling.whole_delay
+        late = np.r_[np.zeros(d + 1), u][: u.size]
+        new = np.r_[np.zeros(d), u][: u.size]
+        found = plant.static[:, None] * late
+        upper = np.flatnonzero(plant.poles.imag >= 0)
+        for i in upper.tolist():
+            driven = self.early[i] * new + self.late[i] * late
+            amplitude = lfilter([0.0, 1.0], [1.0, -self.multipliers[i]], driven)
+            weights = plant.residues[:, i] * (2.0 if plant.poles[i].imag > 0 else 1.0)
+            found += weights.real[:, None] * amplitude.real - weights.imag[:, None] * amplitude.imag
+        steps = self.sampling.remaining * new + self.sampling.late * late
+        single = np.r_[0.0, np.cumsum(steps)[:-1]]
+        by_new, by_late = self.ramps
+        ramps = self.sampling.period * single + by_new * new + by_late * late
+        double = np.r_[0.0, np.cumsum(ramps)[:-1]]
+        return np.asarray(found + np.outer(plant.rigid[:, 0], double) + np.outer(plant.rigid[:, 1], single))
+
+    def free_responses(self, pole: int, count: int) -> Real:
+        """Return the outputs (2, outputs, count) at the samples from amplitudes 1/2 and -i/2 of a pole's pair."""
+        motion = np.exp(self.plant.poles[pole] * self.sampling.period * np.arange(count))
+        values = np.outer(self.plant.residues[:, pole], motion)
+        return np.array([values.real, values.imag])
+
     def scaled_values(
         self, z: Complex, base: NDArray[np.int64] | None, offset: NDArray[Any], delta: Complex | None = None
     ) -> Complex:

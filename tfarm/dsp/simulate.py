@@ -30,6 +30,7 @@ from tfarm.dsp.sensed import sensed_plant
 from tfarm.dsp.simulation import Simulation, Stop, Trace
 from tfarm.dsp.stages import admit
 from tfarm.errors import must_be_known, require
+from tfarm.records import frozen
 
 # records between two samples
 MOST_BETWEEN = 1000
@@ -218,18 +219,8 @@ class Simulator:
 
     def _start(self) -> kernel.State:
         n = self.scenario.feedforward.size
-        outputs = len(self.plant.outputs)
-        return kernel.State(
-            amplitude=self._first[self.kept],
-            rigid=np.zeros(2),
-            held=np.zeros(self.chain.sampling.whole_delay + 2),
-            work=np.zeros(2),
-            circle=np.zeros(self.kept.size),
-            record=np.zeros((n, outputs)),
-            torque=np.zeros(n),
-            fine=np.zeros((n, self.between, outputs)),
-            saturated=np.zeros((n, 3), np.bool_),
-        )
+        state = kernel.rest(self.model, n, self.chain.sampling.whole_delay)
+        return state._replace(amplitude=self._first[self.kept])
 
     def _release(self, unfiltered: Plant, offset: float) -> None:
         """Displace the tip in the first mode, at rest: analog filters start from the value that they were held at.
@@ -295,6 +286,60 @@ class Simulator:
         """Return the recorded outputs."""
         angle, rate, moment, tip, *more = np.ascontiguousarray(record[:, len(self.measured) :].T)
         return Trace(t, angle, rate, moment, tip, dict(zip(self.others, more, strict=True)))
+
+
+@frozen
+class LinearLoop:
+    """A law in z round a plant, whose outputs begin with those `AT_HUB`, without steps, ranges and limits."""
+
+    plant: Plant
+    law: Law
+    chain: Chain
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The signals of the law, then its references."""
+        return *self.law.signals, *self.law.wanted
+
+    @cached_property
+    def _model(self) -> kernel.SampleModel:
+        kept = np.nonzero(self.plant.poles.imag >= 0)[0]
+        row = self.plant.outputs.index("hub_angle")
+        return kernel.model_of(self.plant, kept, self.chain.sampling, 0, row)
+
+    def input(self, references: Real, disturbance: Real) -> Real:
+        """Return the input (n,) from rest under references (n, columns), and a disturbance (n,) on the hub."""
+        chain = self.chain
+        sampling = chain.sampling
+        model = self._model
+        n = disturbance.size
+        outputs = self.plant.outputs
+        sources = np.array([outputs.index(name) if name in outputs else -1 for name in self.columns])
+        electronics = kernel.Electronics(
+            quantisers=quantisers(Chain()),
+            is_differenced=chain.converters.hub_rate == "difference",
+            pole=math.exp(-chain.converters.rate_filter * sampling.period),
+            period=float(sampling.period),
+            delay=sampling.whole_delay,
+            is_single=False,
+            bound=math.inf,
+        )
+        state = kernel.rest(model, n, sampling.whole_delay)
+        kernel.run_samples(
+            model,
+            state,
+            kernel.Forcing(np.zeros(n), disturbance, 0.0),
+            electronics,
+            system_matrix(self.law),
+            np.array([-np.inf, np.inf]),
+            sources,
+            references,
+        )
+        return state.torque
+
+    def input_alone(self, errors: Real) -> Real:
+        """Return the input (n,) of the law alone, from rest, of errors (n, columns)."""
+        return np.asarray(kernel.law_outputs(system_matrix(self.law), errors))
 
 
 def largest_moment(arm: Arm) -> float:

@@ -20,6 +20,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from tfarm.arm import Arm, must_be_arm
+from tfarm.arm.chain import Chain
 from tfarm.arm.schema import file_key
 from tfarm.arm.writing import to_toml
 from tfarm.arrays import Complex, Real
@@ -29,10 +30,19 @@ from tfarm.files import is_standard_output, write_file
 from tfarm.fitting.data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of, rms
 from tfarm.fitting.intervals import BetterError, Fitted, confidence_intervals
 from tfarm.fitting.misses import Miss, Remedy, misses_of, remedies_of
-from tfarm.fitting.model import SENSOR_DELAY, SENSOR_GAIN, FitResponse, Problem, RingMode, free_parameters
+from tfarm.fitting.model import (
+    FitResponse,
+    Problem,
+    RingMode,
+    free_parameters,
+    is_of_chain,
+    with_run_numbers,
+)
 from tfarm.fitting.overlay import ResonanceShift, resonance_shifts
 from tfarm.fitting.posterior import SUFFIX, Posterior, Repeats, posterior_of, repeats
 from tfarm.fitting.ratio import ratio_of
+from tfarm.fitting.run_model import fit_run
+from tfarm.fitting.runs import DRIVE_GAIN, GAIN_KEY, Run, commanded
 from tfarm.fitting.solve import (
     FIT_SEED,
     Solution,
@@ -284,6 +294,8 @@ def fit(
     data: Sequence[Measured],
     free: Sequence[str],
     *,
+    runs: Sequence[Run] = (),
+    chain: Chain | None = None,
     start: Mapping[str, float] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
@@ -291,14 +303,23 @@ def fit(
     profile: bool = True,
     progress: Progress | None = None,
 ) -> Fit:
-    """Return the arm whose free numbers explain the measured responses best.
+    """Return the arm whose free numbers explain the measured responses and runs best.
 
-    `free` are keys of the arm's TOML file, and "gain" and "delay" of each response's sensor; `start`, `bounds` and
+    `free` are keys of the arm's TOML file, and "gain" and "delay" of each response's sensor.  Of `runs`, sampled
+    through `chain` (by default 10 ms, ideal), there are "drive.gain" (torque over a command in any unit), "drive.delay"
+    (dead time [s]) and a sensor's "gain:root_moment"; biases, offsets and the motion at the start are free anyway.
+    `start`, `bounds` and
     `priors` (mean, deviation) are by key, in SI units; `rings` are decays of single modes.  With `profile` each
     interval is that of the profile likelihood, otherwise of the covariance; `progress` gets (done, total, what).
     Raises ParameterError for a key that is none, and for more numbers than data.
     """
-    subject = _problem(arm, data, free, start, bounds, priors, rings)
+    must_be_arm(arm)
+    wanted = [*free]
+    if DRIVE_GAIN in wanted:
+        arm, runs = commanded(arm, runs)
+        given = [_renamed(each) for each in (dict.fromkeys(free), start, bounds, priors)]
+        wanted, start, bounds, priors = [*given[0]], *given[1:]
+    subject = _problem(arm, data, wanted, start, bounds, priors, rings, runs, chain or Chain())
     found = best_solution(subject)
     # a profile may find a lower sum of squares than the search did, a few times
     for _ in range(4):
@@ -321,6 +342,11 @@ def fit(
         interval_by="profile likelihood" if profile else "covariance",
     )
     return replace(fit, arm=replace(fit.arm, assumptions=_assumptions(fit, arm.assumptions)))
+
+
+def _renamed(given: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return numbers by key, that of the drive's gain under the key which the arm has it by."""
+    return {GAIN_KEY if key == DRIVE_GAIN else key: value for key, value in (given or {}).items()}
 
 
 def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
@@ -357,19 +383,36 @@ def is_named(key: str, value: float, text: str) -> bool:
     return bool(re.search(pattern, text)) or value in map(float, values)
 
 
-def _problem(arm: Arm, data: Any, free: Any, start: Any, bounds: Any, priors: Any, rings: Any) -> Problem:
+def _problem(
+    arm: Arm,
+    data: Any,
+    free: Any,
+    start: Any,
+    bounds: Any,
+    priors: Any,
+    rings: Any,
+    runs: Sequence[Run],
+    chain: Chain,
+) -> Problem:
     """Return the search: the arm's numbers, then the sensors' own, one of a kind for each response."""
     must_be_arm(arm)
     data = tuple(data) if isinstance(data, Iterable) and not isinstance(data, str) else (data,)
     for each in data:
         must_be_measured(each)
-    require(data or rings, "data", 0, "give at least one measured response, or a decay (--mode)")
-    keys = [str(key) for key in free if key not in (SENSOR_GAIN, SENSOR_DELAY)]
-    family, numbers = free_parameters(arm, keys, start=start or {}, bounds=bounds or {}, priors=priors or {})
+    remedy = "give at least one measured response, a run, or a decay (--mode)"
+    require(data or rings or runs, "data", 0, remedy)
+    keys = [str(key) for key in free if not is_of_chain(key)]
+    given = [
+        {key: value for key, value in (each or {}).items() if not is_of_chain(key)}
+        for each in (start, bounds, priors)
+    ]
+    family, numbers = free_parameters(arm, keys, start=given[0], bounds=given[1], priors=given[2])
     for each in data:
         ratio_of(arm, each)
     responses = tuple(FitResponse(each, noise_of(each)) for each in data)
-    subject = Problem(family, numbers, responses, tuple(rings)).with_sensors(free)
+    of_runs = tuple(fit_run(arm, each, chain) for each in runs)
+    subject = Problem(family, numbers, responses, tuple(rings), of_runs).with_sensors(free)
+    subject = with_run_numbers(subject, free, start or {}, bounds or {}, priors or {})
     count = len(subject.parameters)
     require(count, "free", "nothing", "name what is free, such as link.youngs_modulus")
     size = subject.residuals(np.zeros(count)).size

@@ -30,6 +30,7 @@ from tfarm.exact.characteristic import characteristic
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exact.system import system_of
 from tfarm.fitting.data import NUMBER, Measured, Noise, in_parts
+from tfarm.fitting.run_model import DRIVE_DELAY, FitRun
 from tfarm.records import frozen
 from tfarm.response.signals import Signals
 from tfarm.spectrum import modes
@@ -202,6 +203,11 @@ SENSOR_GAIN = "gain"
 SENSOR_DELAY = "delay"
 
 
+def is_of_chain(key: str) -> bool:
+    """Return whether a free number is a sensor's or of the drive's dead time, and none of the arm's."""
+    return key in (SENSOR_GAIN, SENSOR_DELAY, DRIVE_DELAY) or key.startswith(f"{SENSOR_GAIN}:")
+
+
 @dataclass(frozen=True)
 class FitResponse:
     """One measured response as the arm has it: its data, noise, and which numbers are its own gain and delay."""
@@ -216,6 +222,23 @@ class FitResponse:
     def size(self) -> int:
         """How many real residuals it has: two a frequency at which something was measured."""
         return 2 * self.noise.is_finite.sum()
+
+    @property
+    def has_known_noise(self) -> bool:
+        """Whether the size of its noise was not taken from the residuals."""
+        return self.noise.is_known
+
+    @property
+    def log_deviation(self) -> float:
+        """The sum of ln sigma over all residuals."""
+        return 2 * float(np.log(self.noise.sigma[self.noise.is_finite]).sum())
+
+    def rescaled(self, residuals: Real, share: float) -> FitResponse:
+        """Return it with a deviation known up to a factor as its own residuals say, times the root of a share."""
+        if self.noise.is_known:
+            return self
+        factor = math.sqrt((residuals @ residuals) / residuals.size * share)
+        return replace(self, noise=replace(self.noise, sigma=self.noise.sigma * max(factor, 1e-12)))
 
     def over_deviation(self, values: Complex) -> Real:
         """Return values at its frequencies over their deviations, in parts, of what was measured."""
@@ -244,6 +267,12 @@ class Problem:
     parameters: tuple[Parameter, ...]
     responses: tuple[FitResponse, ...]
     rings: tuple[RingMode, ...] = ()
+    runs: tuple[FitRun, ...] = ()
+
+    @property
+    def records(self) -> tuple[FitResponse | FitRun, ...]:
+        """What was measured, in the order of the residuals."""
+        return *self.responses, *self.runs
 
     @cached_property
     def of_the_arm(self) -> tuple[Parameter, ...]:
@@ -331,12 +360,12 @@ class Problem:
     def at(self, number: int, omega: Real) -> Problem:
         """Return the problem of one of its responses alone, at other frequencies: for curves."""
         one = self.responses[number].at(omega, np.ones(omega.size, complex), np.ones(omega.size))
-        return replace(self, responses=(one,), rings=())
+        return replace(self, responses=(one,), rings=(), runs=())
 
     # ------------------------------------------------------------ residuals
 
     def residuals(self, point: Real) -> Real:
-        """Return computed less measured over their deviations (size,), then the residuals of decays and priors."""
+        """Return computed less measured over their deviations (size,), of decays and priors last."""
         fractions, others = self._terms(point)
         pairs = zip(fractions, self.responses, strict=True)
         return np.concatenate(
@@ -370,14 +399,16 @@ class Problem:
         return np.concatenate([*slopes, high - low]) / max(width, size)
 
     def _terms(self, point: Real) -> tuple[list[Fraction], Real]:
-        """Return the responses, and what decays and priors leave."""
+        """Return the responses, and what runs, decays and priors leave."""
         coordinates = zip(self.parameters, point.tolist(), strict=True)
         priors = [
             (each.value(x) - each.prior[0]) / each.prior[1]
             for each, x in coordinates
             if each.prior is not None
         ]
-        return self.fractions(point), np.r_[self.decays(point, self.rings), priors]
+        arm = self.arm(point)
+        runs = [each.residuals(arm, lambda place: self.value(point, place)) for each in self.runs]
+        return self.fractions(point), np.concatenate([*runs, self.decays(point, self.rings), priors])
 
     def decays(self, point: Real, rings: Sequence[RingMode]) -> Real:
         """Return the residuals of decays, over their deviations (n,), of logarithms of frequencies and of ratios."""
@@ -390,6 +421,46 @@ class Problem:
         return np.array(rows)
 
 
+def with_run_numbers(
+    problem: Problem,
+    free: Sequence[str],
+    start: Mapping[str, float],
+    bounds: Mapping[str, tuple[float, float]],
+    priors: Mapping[str, tuple[float, float]],
+) -> Problem:
+    """Return the problem with the drive's dead time and gains of sensors free, which its runs have in common.
+
+    Raises ParameterError for a gain of a signal that no run has.
+    """
+    own = [*problem.parameters]
+    runs = [*problem.runs]
+    for key in free:
+        name = key.partition(":")[2]
+        if key == DRIVE_DELAY:
+            require(runs, "free", key, "is of a run: give one, or leave it out")
+            sampling = runs[0].chain.sampling
+            at = start.get(key, sampling.delay_samples * sampling.period)
+            low, high = bounds.get(key, (0.0, 50 * runs[0].run.period))
+            size = runs[0].run.period
+            runs = [replace(each, delay=len(own)) for each in runs]
+        elif name:
+            require(any(name in each.run.names for each in runs), "free", key, "no run has that signal")
+            at = start.get(key, 1.0)
+            low, high = bounds.get(key, (0.0, math.inf))
+            size = 0.0
+            place = len(own)
+            runs = [
+                replace(each, gains=(*each.gains, (name, place))) if name in each.run.names else each
+                for each in runs
+            ]
+        else:
+            continue
+        remedy = f"starts at {at:g}; give bounds low,high around it, or another start"
+        require(low <= at <= high and low < high, f"bounds of {key}", (low, high), remedy)
+        own.append(Parameter(key, at, low, high, size, priors.get(key)))
+    return replace(problem, parameters=tuple(own), runs=tuple(runs))
+
+
 def penalize(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], Real]:
     """Return the residuals with a wall where there is no arm (a mass beyond the tip), too high for a search."""
     near = residuals(first)
@@ -398,7 +469,7 @@ def penalize(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real],
     def found(x: Real) -> Real:
         try:
             return residuals(x)
-        except ParameterError:
+        except (ParameterError, ConvergenceError):
             return wall
 
     return found

@@ -6,13 +6,13 @@ that was running, and that controller.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import field
+from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tfarm.arm import AT_HUB, Arm, Law
+from tfarm.arm import AT_HUB, Arm, Law, Motor
 from tfarm.arm.law import REFERENCE, as_law
 from tfarm.arrays import Real
 from tfarm.errors import MISSING, require
@@ -117,3 +117,25 @@ def run_of(recording: Recording, arm: Arm, law: Law | None = None) -> Run:
         digest=recording.digest,
         note=recording.note,
     )
+
+
+# free number of a fit: torque at the hub over what was commanded, in whatever unit that is
+DRIVE_GAIN = "drive.gain"
+# the number of the arm that it is
+GAIN_KEY = "motor.torque_constant"
+
+
+def commanded(arm: Arm, runs: Sequence[Run]) -> tuple[Arm, tuple[Run, ...]]:
+    """Return the arm with a drive whose gain is its motor's torque constant, and the runs under its command.
+
+    An arm without a motor gets one without gear, inertia and back-EMF: the command is its current.
+    """
+    if arm.motor is None:
+        arm = replace(arm, motor=Motor(resistance=1.0, torque_constant=1.0, back_emf_constant=0.0))
+    remedy = "the gain of its drive is its motor's torque constant: free motor.torque_constant, not both"
+    require(arm.input in ("hub_torque", "motor_current"), "input", arm.input, remedy)
+    driven = []
+    for each in runs:
+        law = each.law
+        driven.append(each if law is None else replace(each, law=replace(law, input=None)))
+    return replace(arm, input="motor_current"), tuple(driven)

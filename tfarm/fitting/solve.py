@@ -29,8 +29,10 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.fitting.data import CONFIDENCE, in_parts
 from tfarm.fitting.model import Problem, penalize
+from tfarm.fitting.run_model import chance_of_white
 from tfarm.records import frozen
 from tfarm.schema import Quantity
+from tfarm.spectrum.table import first_frequency
 
 # of all that a fit draws: the number of the paper's article, any would do
 FIT_SEED = 852780
@@ -142,6 +144,8 @@ def thin_problem(problem: Problem, most: int = 400) -> Problem:
 
 # of ln p: a combination with a larger deviation (a factor of e) is not determined by the data
 OPEN_DEVIATION = 1.0
+# of white residuals in a right model: a lesser one rejects it
+LEAST_CHANCE = 0.01
 # of a sum of squares: a smaller difference is none
 SAME_SUM = 0.1
 # of a sum of squares: noise alone makes up an effect of four deviations once in 15,000 fits
@@ -173,8 +177,8 @@ class Solution:
 
     @cached_property
     def parts(self) -> tuple[Real, ...]:
-        """The residuals of each response, over their deviations."""
-        ends = np.cumsum([each.size for each in self.problem.responses], dtype=int)
+        """The residuals of each response and run, over their deviations."""
+        ends = np.cumsum([each.size for each in self.problem.records], dtype=int)
         return tuple(np.split(self.residuals, ends)[:-1])
 
     @property
@@ -187,20 +191,27 @@ class Solution:
             help="residuals less free numbers; chi-squared is about as large where arm and noise explain the data",
         ),
     ]:
-        """Residuals less parameters."""
-        return self.residuals.size - self.point.size
+        """Residuals less parameters, and less the numbers of each run of its own."""
+        return self.residuals.size - self.point.size - sum(each.own for each in self.problem.runs)
 
     @property
     def has_known_noise(self) -> bool:
         """Whether the size of no noise was taken from the residuals."""
-        return all(each.noise.is_known for each in self.problem.responses)
+        return all(each.has_known_noise for each in self.problem.records)
+
+    @cached_property
+    def chance_of_white(self) -> float:
+        """The probability of residuals of the runs' outputs so far from white noise, of all outputs together."""
+        found: list[float] = []
+        of_runs = self.parts[len(self.problem.responses) :]
+        for each, residuals in zip(self.problem.runs, of_runs, strict=True):
+            found += map(chance_of_white, residuals.reshape(len(each.sigma), -1))
+        return min(1.0, len(found) * min(found, default=1.0))
 
     @property
     def misfit(self) -> float:
         """Minus ln of the likelihood, but for a constant: with the noise, where that is from the residuals."""
-        noises = [each.noise for each in self.problem.responses]
-        sigma = np.concatenate([np.empty(0), *(each.sigma[each.is_finite] for each in noises)])
-        return self.chi_squared / 2 + 2 * float(np.log(sigma).sum())
+        return self.chi_squared / 2 + math.fsum(each.log_deviation for each in self.problem.records)
 
     @property
     def quantile(self) -> float:
@@ -220,7 +231,10 @@ def best_solution(problem: Problem, is_enough: Callable[[Solution], bool | None]
     found: list[Solution] = []
     # draws about the point that the equation errors lead to, and their shares of w one after another
     for draws, shares in ((0, [0.1]), (300, [0.1]), (300, [1.0, 0.3, 0.1])):
-        found.append(rescale_noise(nearest_minimum(*start_by(problem, draws, shares))))
+        if problem.runs:
+            found.append(solution_of_runs(problem, draws))
+        else:
+            found.append(rescale_noise(nearest_minimum(*start_by(problem, draws, shares))))
         best = min(found, key=lambda each: each.misfit)
         if best.converged and (is_enough or is_explained)(best):
             break
@@ -234,6 +248,37 @@ def best_solution(problem: Problem, is_enough: Callable[[Solution], bool | None]
         if not best.converged:
             best = nearest_minimum(best.problem, best.point)
     return replace(nearest_to_start(best), starts=len(found))
+
+
+def solution_of_runs(problem: Problem, draws: int) -> Solution:
+    """Return a least sum of squares over the starts of records of runs, each cut short first.
+
+    The phase of a mode is off by its frequency's error times the time, so the first periods of a record have few
+    minima: a search goes on from them over longer and longer parts.  Frequency responses beside the runs give a start.
+    Where a controller reads what was recorded, the noise that fits better is taken (`run_model`).
+    """
+    # of ln p, of draws about the start
+    spread = 0.15
+    # of mode 1 at the start, in the shortest part
+    periods = 4
+    start = problem.start
+    normal = np.random.default_rng(FIT_SEED + draws).standard_normal((10 + draws // 10, start.size))
+    points = [start, *map(problem.inside, start + spread * normal)]
+    if problem.responses:
+        points.append(best_solution(replace(problem, runs=())).point)
+    least = periods * 2 * math.pi / first_frequency(problem.arm(start))
+    whole = max(each.run.count * each.run.period for each in problem.runs)
+    for duration in (least, math.sqrt(least * whole), whole):
+        part = replace(problem, runs=tuple(each.until(duration) for each in problem.runs))
+        kept = sorted(points, key=partial(sum_of_squares, part))[: 3 if duration == least else 2]
+        points = [nearest_minimum(part, each, evaluations=20).point for each in kept]
+    best = min((nearest_minimum(problem, each) for each in points), key=lambda each: each.chi_squared)
+    best = rescale_noise(best)
+    if any(each.reads_all for each in problem.runs):
+        around = tuple(replace(each, through_loop=each.reads_all) for each in best.problem.runs)
+        other = rescale_noise(nearest_minimum(replace(best.problem, runs=around), best.point))
+        best = min(best, other, key=lambda each: each.misfit)
+    return best
 
 
 def nearest_to_start(found: Solution) -> Solution:
@@ -277,11 +322,17 @@ def open_axes(jacobian: Real, deviation: float = OPEN_DEVIATION) -> Real:
 
 
 def is_explained(one: Solution) -> bool | None:
-    """Return whether noise alone gives such a sum often enough; None where its size was taken from the residuals."""
-    if not one.has_known_noise:
-        return None
+    """Return whether noise alone gives such residuals often enough; None where nothing tests that.
+
+    A sum of squares tests it where the size of all noise is known, and of runs it is white.
+    """
     # the probability of a sum of squares by noise alone
-    return bool(chdtrc(max(one.freedom, 1), one.chi_squared) > 1e-6)
+    is_small = chdtrc(max(one.freedom, 1), one.chi_squared) > 1e-6
+    if one.has_known_noise and not is_small:
+        return False
+    if one.problem.runs:
+        return one.chance_of_white > LEAST_CHANCE
+    return True if one.has_known_noise else None
 
 
 def nearest_minimum(
@@ -326,14 +377,11 @@ def rescale_noise(found: Solution) -> Solution:
     """Return the solution with each noise that is known up to a factor multiplied by what its residuals say."""
     if found.has_known_noise:
         return found
+    count = len(found.problem.responses)
     for _ in range(3):
-        responses = []
         share = found.residuals.size / max(found.freedom, 1)
-        for each, own in zip(found.problem.responses, found.parts, strict=True):
-            noise = each.noise
-            if not noise.is_known:
-                factor = math.sqrt((own @ own) / own.size * share)
-                noise = replace(noise, sigma=noise.sigma * max(factor, 1e-12))
-            responses.append(replace(each, noise=noise))
-        found = nearest_minimum(replace(found.problem, responses=tuple(responses)), found.point)
+        pairs = zip(found.problem.records, found.parts, strict=True)
+        records: Any = [each.rescaled(own, share) for each, own in pairs]
+        problem = replace(found.problem, responses=tuple(records[:count]), runs=tuple(records[count:]))
+        found = nearest_minimum(problem, found.point)
     return found

@@ -1,0 +1,355 @@
+"""A measured run as the exact sampled plant has it, and what it leaves: computed less measured, over its deviation.
+
+Open loop: the plant under the held input.  Closed loop: the controller under the recorded references has the input, so
+that no noise of the record acts on the model.  An output is linear in numbers that are of this run alone,
+
+    y = y(arm) + sum of c_j d_j:    bias of the drive, offsets of sensors, drift and amplitudes of modes at the start,
+
+so these are the least squares of each arm (variable projection, Golub and Pereyra 1973), under a controller as
+disturbances d_j of what it reads: y = d + G u(d).  The offset of the hub's angle is where the arm rests at the start.
+A bias is integrated twice by a hub that turns freely.
+
+Noise of a sensor e that the controller reads acts on the arm, too: what it leaves is S e.  With the loop L of the same
+arm e = (1 + L) S e is white again (`through_loop`), as the errors of a prediction by the recorded signals are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.special import chdtrc
+
+from tfarm.arm import AT_HUB, Arm
+from tfarm.arm.chain import Chain
+from tfarm.arrays import Real
+from tfarm.case import Case
+from tfarm.dsp.discretise import acting_law
+from tfarm.dsp.plant import Plant
+from tfarm.dsp.pulse import PulseTransfer
+from tfarm.dsp.results import ideal_chain
+from tfarm.dsp.scenarios import Scenario
+from tfarm.dsp.sensed import sensed_plant
+from tfarm.dsp.simulate import LinearLoop, references_of
+from tfarm.errors import require
+from tfarm.fitting.runs import Run
+from tfarm.records import frozen
+from tfarm.spectrum import modes_below
+
+DRIVE_DELAY = "drive.delay"
+BIAS = "drive.bias"
+
+
+class RunResponse(NamedTuple):
+    """Computed outputs (outputs, n) of a run, and those (own, outputs, n) by a unit of each of its own numbers."""
+
+    outputs: Real
+    by_own: Real
+
+
+@dataclass(frozen=True)
+class FitRun:
+    """A run in a fit: through which `chain`, with `count` modes, and the deviations `sigma` of its outputs.
+
+    `is_known` (outputs,) is whether a deviation was given, or is that of the residuals.  `gains` has the places of
+    sensors' gains in the vector of what is searched for, `delay` that of the drive's dead time.  `own` is how many
+    numbers it has of its own: with `is_moving` also the hub's drift and amplitudes of the lowest modes at the start.
+    """
+
+    run: Run
+    chain: Chain
+    count: int
+    sigma: tuple[float, ...]
+    is_known: tuple[bool, ...]
+    is_moving: bool
+    own: int = 0
+    through_loop: bool = False
+    gains: tuple[tuple[str, int], ...] = ()
+    delay: int | None = None
+
+    @property
+    def size(self) -> int:
+        """How many residuals it has: one a sample of each output."""
+        return self.run.count * len(self.run.names)
+
+    @property
+    def has_known_noise(self) -> bool:
+        """Whether the size of no output's noise was taken from the residuals."""
+        return all(self.is_known)
+
+    @property
+    def log_deviation(self) -> float:
+        """The sum of ln sigma over all residuals."""
+        return self.run.count * math.fsum(map(math.log, self.sigma))
+
+    @cached_property
+    def measured(self) -> Real:
+        """The measured outputs (outputs, n)."""
+        return np.array([*self.run.outputs.values()])
+
+    @property
+    def ratio(self) -> int:
+        """Samples of the record in one of the controller.
+
+        Raises ParameterError where that is no whole number.
+        """
+        if self.run.law is None:
+            return 1
+        period = self.chain.sampling.period
+        ratio = period / self.run.period
+        remedy = f"a record has the period of its controller, {period:g} s, or that over a whole number"
+        require(abs(ratio - round(ratio)) < 1e-3 and round(ratio) > 0, "period", self.run.period, remedy)
+        return round(ratio)
+
+    def until(self, duration: float) -> FitRun:
+        """Return its first part of that duration [s], but of 64 samples at least."""
+        samples = max(64, math.ceil(duration / self.run.period))
+        run = self.run
+        kept: dict[str, Any] = {
+            "outputs": {name: values[:samples] for name, values in run.outputs.items()},
+            "references": {name: values[:samples] for name, values in run.references.items()},
+            "input": None if run.input is None else run.input[:samples],
+        }
+        return replace(self, run=replace(run, **kept))
+
+    def rescaled(self, residuals: Real, share: float) -> FitRun:
+        """Return it with each deviation that is not known as its own residuals say, times the root of a share."""
+        rows = residuals.reshape(len(self.sigma), -1)
+        factors = np.maximum(np.sqrt((rows**2).mean(axis=1) * share), 1e-12)
+        sigma = np.array(self.sigma) * np.where(self.is_known, 1.0, factors)
+        return replace(self, sigma=tuple(sigma.tolist()))
+
+    # ------------------------------------------------------------ outputs
+
+    def respond(self, arm: Arm, value: Callable[[int], float]) -> RunResponse:
+        """Return the outputs of an arm; `value` gives the number of a place in what is searched for."""
+        run = self.run
+        steady = np.ones(run.count)
+        pulse = self.pulse(arm, value)
+        rows = [pulse.plant.outputs.index(name) for name in run.names]
+        if run.law is None:
+            assert run.input is not None
+            found = pulse.held_response(run.input)
+            columns = [pulse.held_response(steady), *self._free(pulse, rows)]
+        else:
+            loop = self.loop(arm, value)
+            zero = 0 * steady
+            found = pulse.held_response(loop.input(loop.wanted, zero))
+            at_once = PulseTransfer(pulse.plant, replace(pulse.sampling, delay_samples=0.0))
+            answer = pulse.held_response(loop.input(0 * loop.wanted, steady))
+            columns = [at_once.held_response(steady) + answer]
+            for on_signals in self._free(pulse, rows):
+                answer = pulse.held_response(loop.input(-loop.read(on_signals), zero))
+                columns.append(on_signals + answer)
+        return RunResponse(found[rows], np.array(columns)[:, rows])
+
+    def pulse(self, arm: Arm, value: Callable[[int], float]) -> PulseTransfer:
+        """Return the plant of the run's signals at the samples of its record, times the gains of sensors.
+
+        Under a controller its first outputs are those `AT_HUB`.
+        """
+        law = self.run.law
+        read = () if law is None else (*AT_HUB, *law.signals)
+        names = tuple(dict.fromkeys((*read, *self.run.names)))
+        chain = self._chain(value)
+        gains = dict.fromkeys(names, 1.0) | {name: value(place) for name, place in self.gains}
+        plant = sensed_plant(arm, chain, names, self.count).together
+        by_output = np.array([gains[name] for name in names])
+        return PulseTransfer(plant.times(by_output), at_period(chain, self.run.period).sampling)
+
+    def loop(self, arm: Arm, value: Callable[[int], float]) -> RunLoop:
+        """Return the controller round the plant of the run's signals."""
+        assert self.run.law is not None
+        pulse = self.pulse(arm, value)
+        acting, late = acting_law(Case(arm, self.run.law, self._chain(value)))
+        return RunLoop(self.run, self.ratio, LinearLoop(pulse.plant, acting, late))
+
+    def _chain(self, value: Callable[[int], float]) -> Chain:
+        """Return the chain without steps and limits, of an open loop at the record's period, with the dead time."""
+        chain = ideal_chain(self.chain)
+        if self.run.law is None:
+            chain = at_period(chain, self.run.period)
+        if self.delay is None:
+            return chain
+        delay = value(self.delay) / chain.sampling.period
+        return replace(chain, sampling=replace(chain.sampling, delay_samples=delay))
+
+    def _free(self, pulse: PulseTransfer, rows: Sequence[int]) -> Iterator[Real]:
+        """Yield outputs (names, n) by a unit of each offset, of the hub's drift, and of modes at the start."""
+        n = self.run.count
+        plant = pulse.plant
+        for row in rows:
+            yield np.repeat(np.eye(len(plant.outputs))[row][:, None], n, axis=1)
+        if not self.is_moving:
+            return
+        if plant.rigid[:, 0].any():
+            yield plant.rigid[:, :1] * self.run.t + plant.rigid[:, 1:]
+        for pole in self._moving(plant):
+            first, second = pulse.free_responses(pole, n)
+            yield first
+            if plant.poles[pole].imag > 0:
+                yield second
+
+    def _moving(self, plant: Plant) -> Iterator[int]:
+        """Yield the poles whose amplitudes at the start are free, one of each pair: up to four, the slowest first."""
+        poles = plant.poles
+        period = self.run.period
+        kept = np.flatnonzero(
+            (poles.imag >= 0) & (poles.imag < math.pi / period) & (-poles.real * period < 1)
+        )
+        yield from kept[np.argsort(abs(poles[kept]), kind="stable")][:4].tolist()
+
+    def own_names(self, arm: Arm) -> list[str]:
+        """Return what the run's own numbers are, in the order of `RunResponse.by_own`."""
+        found = [BIAS, *(f"offset of {name}" for name in self.run.names)]
+        if self.is_moving:
+            plant = sensed_plant(arm, self._chain(lambda _: 0.0), self.run.names, self.count).together
+            found += ["drift of the hub"] * bool(plant.rigid[:, 0].any())
+            for pole in self._moving(plant):
+                mode = f"mode {plant.mode[pole]}" if plant.mode[pole] else "hub or filter"
+                found += [f"{mode} at the start"] * (1 + (plant.poles[pole].imag > 0))
+        return found
+
+    # ------------------------------------------------------------ residuals
+
+    def residuals(self, arm: Arm, value: Callable[[int], float]) -> Real:
+        """Return computed less measured over the deviations (size,), the run's own numbers at their least squares."""
+        off, basis, _ = self._projection(arm, value)
+        return off - basis @ (basis.T @ off)
+
+    def own_numbers(self, arm: Arm, value: Callable[[int], float]) -> tuple[Real, Real]:
+        """Return the run's own numbers and their standard deviations; not a number where they are not determined."""
+        off, _, columns = self._projection(arm, value)
+        size = np.linalg.norm(columns, axis=0)
+        is_seen = size > 0
+        scaled = columns[:, is_seen] / size[is_seen]
+        found = np.full((2, size.size), math.nan)
+        found[0, is_seen] = -np.linalg.lstsq(scaled, off)[0] / size[is_seen]
+        spread = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
+        found[1, is_seen] = np.sqrt(np.diag(spread)) / size[is_seen]
+        return found[0], found[1]
+
+    def _projection(self, arm: Arm, value: Callable[[int], float]) -> tuple[Real, Real, Real]:
+        """Return the residuals with own numbers of 0, an orthonormal basis of what these can add, and their columns."""
+        found = self.respond(arm, value)
+        parts = np.concatenate([(found.outputs - self.measured)[None], found.by_own])
+        require(np.isfinite(parts).all(), "run", self.run.source, "the loop of this arm grows without bound")
+        if self.through_loop:
+            parts = self.innovations(arm, value, parts)
+        parts = (parts / np.array(self.sigma)[:, None]).reshape(len(parts), -1)
+        off = parts[0]
+        columns = parts[1:].T
+        size = np.linalg.norm(columns, axis=0)
+        seen = columns[:, size > 0] / size[size > 0]
+        Q, R = np.linalg.qr(seen)
+        # a column that others make up adds nothing
+        return off, np.asarray(Q[:, abs(np.diag(R)) > 1e-9]), columns
+
+    def innovations(self, arm: Arm, value: Callable[[int], float], parts: Real) -> Real:
+        """Return (1 + L) of deviations (rows, outputs, n): what the noise of sensors was before it went round."""
+        pulse = self.pulse(arm, value)
+        loop = self.loop(arm, value)
+        rows = [pulse.plant.outputs.index(name) for name in self.run.names]
+        found = []
+        for part in parts:
+            read = np.zeros((len(pulse.plant.outputs), self.run.count))
+            read[rows] = -part
+            found.append(part - pulse.held_response(loop.input_alone(loop.read(read)))[rows])
+        return np.array(found)
+
+    @property
+    def reads_all(self) -> bool:
+        """Whether the record has all signals that its controller reads."""
+        return self.run.law is not None and set(self.run.law.signals) <= set(self.run.names)
+
+
+@frozen
+class RunLoop:
+    """The controller of a run round its plant, a sample of it at every `ratio` of the record."""
+
+    run: Run
+    ratio: int
+    linear: LinearLoop
+
+    @property
+    def wanted(self) -> Real:
+        """The references (steps, columns) of the controller."""
+        given = {name: values[:: self.ratio] for name, values in self.run.references.items()}
+        zero = np.zeros(-(-self.run.count // self.ratio))
+        angle, rate, moment = (given.get(name, zero) for name in AT_HUB)
+        task = Scenario("measured", self.run.period, zero, angle, rate, moment, zero)
+        return references_of(self.linear.law, task)
+
+    def read(self, signals: Real) -> Real:
+        """Return what the controller reads (steps, columns) of signals (outputs, n) of the plant."""
+        outputs = self.linear.plant.outputs
+        sampled = signals[:, :: self.ratio]
+        found = np.zeros((sampled.shape[1], len(self.linear.columns)))
+        for column, name in enumerate(self.linear.columns):
+            if name in outputs:
+                found[:, column] = sampled[outputs.index(name)]
+        return found
+
+    def input(self, references: Real, on_hub: Real) -> Real:
+        """Return the input (n,) under references (steps, columns) and a torque (n,) on the hub."""
+        return self._held(self.linear.input(references, on_hub[:: self.ratio]))
+
+    def input_alone(self, errors: Real) -> Real:
+        """Return the input (n,) of the controller alone of errors (steps, columns)."""
+        return self._held(self.linear.input_alone(errors))
+
+    def _held(self, u: Real) -> Real:
+        return np.repeat(u, self.ratio)[: self.run.count]
+
+
+def modes_of_run(arm: Arm, run: Run) -> int:
+    """Return the number of modes that a run is computed with: up to four times the sampling rate's half, two more."""
+    most = 20
+    return min(most, modes_below(arm, 4 * math.pi / run.period) + 2)
+
+
+def fit_run(arm: Arm, run: Run, chain: Chain) -> FitRun:
+    """Return a run as a fit begins with it: deviations that are not known a tenth of their signal's."""
+    sigma = []
+    for name, values in run.outputs.items():
+        usual = 0.1 * float(np.std(values)) or 1.0
+        sigma.append(run.sigma.get(name, usual))
+    known = tuple(name in run.sigma for name in run.names)
+    if run.law is not None and run.law.period is not None:
+        chain = replace(chain, sampling=replace(chain.sampling, period=run.law.period))
+    found = FitRun(run, chain, modes_of_run(arm, run), tuple(sigma), known, is_moving=run.law is None)
+    # raises for a period that is no part of the controller's
+    assert found.ratio
+    return replace(found, own=len(found.own_names(arm)))
+
+
+def at_period(chain: Chain, period: float) -> Chain:
+    """Return the chain at another sampling period, with the same dead time."""
+    sampling = chain.sampling
+    delay = sampling.delay_samples * sampling.period / period
+    return replace(chain, sampling=replace(sampling, period=period, delay_samples=delay))
+
+
+def chance_of_white(residuals: Real) -> float:
+    """Return the probability that white noise has autocorrelations, or a line of its spectrum, as large as these.
+
+    By Ljung and Box (1978) over 20 lags, and by Fisher (1929) for the largest line of the periodogram; twice the lesser
+    of the two.
+    """
+    e = residuals - residuals.mean()
+    n = e.size
+    lags = np.arange(1, min(20, n // 5) + 1)
+    total = float(e @ e)
+    if total == 0 or not lags.size:
+        return 1.0
+    r = np.array([e[lag:] @ e[:-lag] for lag in lags.tolist()]) / total
+    by_lags = float(chdtrc(lags.size, n * (n + 2) * (r**2 / (n - lags)).sum()))
+    lines = abs(np.fft.rfft(e)[1 : (n + 1) // 2]) ** 2
+    share = float(lines.max() / lines.sum())
+    # the first term of Fisher's series: an upper bound, and the whole of it where it is small
+    by_line = min(1.0, lines.size * (1 - share) ** (lines.size - 1))
+    return min(1.0, 2 * min(by_lags, by_line))
