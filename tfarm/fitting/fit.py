@@ -328,7 +328,9 @@ def fit(
             break
         except BetterError as better:
             (there,) = better.args
-            found = replace(nearest_minimum(there.problem, there.point), starts=found.starts)
+            pairs = zip(found.problem.parameters, there.problem.parameters, there.point.tolist(), strict=True)
+            point = np.array([own.coordinate(each.value(x)) for own, each, x in pairs])
+            found = replace(nearest_minimum(found.problem, point), starts=found.starts)
     else:
         # one valley after another: no end of it
         found = replace(found, converged=False)

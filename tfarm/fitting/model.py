@@ -42,7 +42,8 @@ from tfarm.spectrum.table import first_frequency
 class Parameter:
     """A free number: its key, where the search starts, its bounds, all in SI units, and a prior (mean, deviation).
 
-    The search is for (value - start)/size, or where the size is 0 for ln(value/start).
+    The search is for (value - start)/size, or where the size is 0 for ln(value/start); of one `is_inverse` for
+    (1/value - 1/start)/size.
     """
 
     key: str
@@ -51,17 +52,22 @@ class Parameter:
     high: float
     size: float = 0.0
     prior: tuple[float, float] | None = None
+    is_inverse: bool = False
     # times the start, or a part of it: beyond, a search has lost its way, or the data say nothing
     farthest: ClassVar[float] = 1e4
 
     def value(self, coordinate: float) -> float:
         """Return the number at a coordinate of the search, 0 at the start."""
+        if self.is_inverse:
+            return 1.0 / (1.0 / self.start + self.size * coordinate)
         if self.size:
             return self.start + self.size * coordinate
         return self.start * math.exp(coordinate)
 
     def coordinate(self, value: float) -> float:
         """Return the coordinate of a number."""
+        if self.is_inverse:
+            return (1.0 / value - 1.0 / self.start) / self.size
         if self.size:
             return (value - self.start) / self.size
         return math.log(value / self.start)
@@ -70,7 +76,8 @@ class Parameter:
     def bounds(self) -> tuple[float, float]:
         """Of the coordinate."""
         if self.size:
-            return self.coordinate(self.low), self.coordinate(self.high)
+            low, high = sorted((self.coordinate(self.low), self.coordinate(self.high)))
+            return low, high
         ends = (self.low / self.start, self.high / self.start)
         shares = np.clip(ends, 1 / self.farthest, self.farthest)
         return math.log(shares.min()), math.log(shares.max())

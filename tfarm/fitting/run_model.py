@@ -57,7 +57,7 @@ class FitRun:
 
     `is_known` (outputs,) is whether a deviation was given, or is that of the residuals.  `gains` has the places of
     sensors' gains in the vector of what is searched for, `delay` that of the drive's dead time.  `own` is how many
-    numbers it has of its own: with `is_moving` also the hub's drift and amplitudes of the lowest modes at the start.
+    numbers it has of its own: with `is_moving` also angular momentum and amplitudes of the lowest modes at the start.
     """
 
     run: Run
@@ -179,7 +179,7 @@ class FitRun:
         return replace(chain, sampling=replace(chain.sampling, delay_samples=delay))
 
     def _free(self, pulse: PulseTransfer, rows: Sequence[int]) -> Iterator[Real]:
-        """Yield outputs (names, n) by a unit of each offset, of the hub's drift, and of modes at the start."""
+        """Yield outputs (names, n) by a unit of each offset, of angular momentum and of modes at the start."""
         n = self.run.count
         plant = pulse.plant
         for row in rows:
@@ -208,7 +208,7 @@ class FitRun:
         found = [BIAS, *(f"offset of {name}" for name in self.run.names)]
         if self.is_moving:
             plant = sensed_plant(arm, self._chain(lambda _: 0.0), self.run.names, self.count).together
-            found += ["drift of the hub"] * bool(plant.rigid[:, 0].any())
+            found += ["angular momentum at the start"] * bool(plant.rigid[:, 0].any())
             for pole in self._moving(plant):
                 mode = f"mode {plant.mode[pole]}" if plant.mode[pole] else "hub or filter"
                 found += [f"{mode} at the start"] * (1 + (plant.poles[pole].imag > 0))
