@@ -109,7 +109,7 @@ def confidence_intervals(
             if profile:
                 ends = [profile_end(found, n, end, quantile, held) for end in ends]
             if n in bounds:
-                low, high = bounded_ends(before[n], each, ends)
+                low, high = bounded_ends(before[n], each, ends, bounds[n])
             else:
                 low, high = each.ends(ends)
                 deviation = own * (each.size or abs(value))
@@ -167,21 +167,20 @@ def at_bounds(found: Solution, quantile: float) -> tuple[Solution, dict[int, tup
 
 
 def bounded_ends(
-    before: Parameter, each: Parameter, ends: Sequence[float]
+    before: Parameter, each: Parameter, ends: Sequence[float], alone: tuple[float, float | None]
 ) -> tuple[float | None, float | None]:
-    """Return the interval of a number between two coordinates; where it ends only as the search does, what it was.
+    """Return the interval of a number between two coordinates, and that with the others held, together.
 
-    None, None where there is no bound at all.
+    Where it ends only as the search does, the number's own bound, or None, is its end.
     """
     low, high = sorted(map(each.value, ends))
     # of a number: one so near to the reach of the search has ended there
     near = 1e-6
-    is_low = low > each.low * (1 + near)
-    is_high = high < each.high * (1 - near)
-    if not is_low and not is_high and math.isinf(before.high):
+    lower = min(alone[0], low if low > each.low * (1 + near) else before.low)
+    upper = max(alone[1] or math.inf, high if high < each.high * (1 - near) else before.high)
+    if lower == 0 and math.isinf(upper):
         return None, None
-    upper = high if is_high else before.high
-    return low if is_low else before.low, None if math.isinf(upper) else upper
+    return lower, None if math.isinf(upper) else upper
 
 
 def one_sided_interval(found: Solution, n: int, quantile: float) -> tuple[float | None, float | None]:
@@ -226,7 +225,8 @@ def profile_end(found: Solution, n: int, at: float, quantile: float, held: dict[
     # of the others where n is held elsewhere
     slope = np.eye(found.point.size)[n]
     slope[rest] = -np.linalg.lstsq(found.jacobian[:, rest], found.jacobian[:, n], rcond=None)[0]
-    own = near = found.point[n]
+    own = near = inside = found.point[n]
+    outside = math.inf if at > own else -math.inf
     root_near = 0.0
     # three steps do but in a crooked valley
     for _ in range(12):
@@ -249,7 +249,14 @@ def profile_end(found: Solution, n: int, at: float, quantile: float, held: dict[
             times = np.clip((quantile - root) / (root - root_near), -3, 3)
         near = at
         root_near = root
+        if root < quantile:
+            inside = at
+        else:
+            outside = at
         at = at + times * last
+        # a profile that is not monotonic ends between what is inside and what is outside
+        if not min(inside, outside) < at < max(inside, outside):
+            at = (inside + outside) / 2 if math.isfinite(outside) else 2 * inside - own
     return float(at)
 
 
