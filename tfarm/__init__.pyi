@@ -28,6 +28,8 @@ from tfarm.fitting.data import Measured as Measured
 from tfarm.fitting.data import read_measured as read_measured
 from tfarm.fitting.fit import fit as fit
 from tfarm.fitting.overlay import overlay as overlay
+from tfarm.fitting.recording import read_recording as read_recording
+from tfarm.fitting.run_files import runs_of as runs_of
 from tfarm.loop.locus import locus as locus
 from tfarm.loop.margins import margins as margins
 from tfarm.loop.norms import norm as norm
