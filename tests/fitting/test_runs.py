@@ -2,6 +2,8 @@
 
 import math
 from dataclasses import replace
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +12,10 @@ from scipy.stats import binom
 
 import tfarm
 from tests.shared import refusal
+from tests.shell import answer, refused
 from tfarm.arm import AT_HUB
-from tfarm.arm.chain import Chain, Converters, Sampling
+from tfarm.arm.chain import Actuator, Chain, Converters, Sampling, load_chain
+from tfarm.arm.writing import to_toml
 from tfarm.case import Case
 from tfarm.dsp.discretise import acting_law
 from tfarm.dsp.pulse import PulseTransfer
@@ -20,8 +24,10 @@ from tfarm.dsp.sensed import sensed_plant
 from tfarm.dsp.simulate import LinearLoop, Simulator, references_of
 from tfarm.fitting.fit import fit
 from tfarm.fitting.model import Problem, free_parameters, with_run_numbers
+from tfarm.fitting.posterior import load_posterior
 from tfarm.fitting.run_model import chance_of_white, fit_run
 from tfarm.fitting.runs import Run
+from tfarm.schema import to_dict
 
 LAB = tfarm.load("sasaki2012-lab")
 T = 0.01
@@ -282,9 +288,7 @@ def assert_found(found, planted):
 
 
 def test_gain_and_dead_time_of_the_drive_are_found_in_open_loop():
-    free = [*PLANTED, "drive.gain"]
-    run = open_run(times=0.25)
-    found = fit(START, [], free, runs=[run], chain=chain_of(0.0), profile=False)
+    found = fit_of_open_run()
     assert_found(found, PLANTED | {"motor.torque_constant": 0.25})
     assert found.verdict == "fitted"
     assert not found.problem.runs[0].through_loop
@@ -300,3 +304,103 @@ def test_noise_of_sensors_that_the_controller_reads_is_known_by_its_residuals(in
     assert found.chance_of_white > 0.01
     for name, sigma in zip(run.run.names, run.sigma, strict=True):
         assert sigma == pytest.approx(SIGMA[name], rel=5 / math.sqrt(2 * run.run.count))
+
+
+# ------------------------------------------------------------ results, files and the command
+
+
+@cache
+def fit_of_open_run():
+    """A fit whose model of the drive, and so whose arm, has the gain of 0.25 N m over the command."""
+    run = open_run(times=0.25)
+    return fit(START, [], [*PLANTED, "drive.gain"], runs=[run], chain=chain_of(0.0), profile=False)
+
+
+def test_the_results_of_a_run_are_its_noise_and_its_own_numbers():
+    found = fit_of_open_run()
+    for row in found.run_signals:
+        assert row.noise == "white at the output"
+        assert row.deviation == pytest.approx(SIGMA[row.signal], rel=0.2)
+        assert row.chain == 0
+        assert row.chance > 0.01
+    own = {row.number: row for row in found.own_numbers}
+    bias = own["drive.bias"]
+    assert bias.unit == "A"
+    assert abs(bias.value - 0.02 / 0.25) < 4 * bias.deviation
+    (note,) = found.run_notes
+    turned = 0.02 * found.problem.runs[0].run.t[-1] ** 2 / (2 * J)
+    assert f"by {turned:.2g}"[:-1] in note
+    assert "residuals are white" in found.in_words
+    (curves,) = found.run_curves
+    np.testing.assert_allclose(np.std(curves.computed - curves.measured, axis=1), [2e-3, 0.02], rtol=0.2)
+    assert to_dict(found)["runs"][0]["by_chain"] == 0.0
+    assert found.arm.assumptions[-1].startswith("Fitted to a run of array in open loop")
+
+
+def test_a_wrong_arm_leaves_residuals_that_are_not_white():
+    heavy = replace(LAB, payload=replace(LAB.payload, mass=0.3))
+    found = fit(heavy, [], ["hub.inertia"], runs=[open_run(n=300)], chain=chain_of(), profile=False)
+    assert not found.is_explained
+    assert "model rejected: residuals are not white (chance " in found.in_words
+    assert found.verdict == "fitted, but the arm does not explain the data"
+
+
+def test_limits_of_the_chain_that_are_reached_are_named():
+    """What the simulator has with a limit of 0.3 N m less what it has without."""
+    limited = replace(chain_of(), actuator=Actuator(torque_limit=0.3), converters=Converters(encoder_counts=500))
+    reference = np.cumsum(command(300, size=2.0)) * T
+    task = task_of(0 * reference, reference)
+    free, held = (signals_of(simulated(LAB, SERVO, each, task)) for each in (chain_of(), limited))
+    outputs = with_noise(free, 2)
+    run = Run(period=T, outputs=outputs, references={"hub_angle": reference}, law=SERVO)
+    model = replace(fit_run(LAB, run, limited), sigma=(1e-3, 0.01), count=MODES)
+    effects = model.chain_effects(LAB, lambda place: math.nan)
+    right = [abs(held[name] - free[name]).max() / sigma for name, sigma in zip(outputs, (1e-3, 0.01), strict=True)]
+    np.testing.assert_allclose(effects, right, rtol=1e-9)
+    step = 2 * math.pi / 500
+    assert model.rescaled(np.zeros(600), 1.0).sigma[0] == pytest.approx(step / math.sqrt(12))
+    arm = fit(LAB, [], ["hub.inertia"], runs=[run], chain=limited, profile=False)
+    assert any("(saturation)" in note for note in arm.run_notes)
+
+
+def csv_of(run, path):
+    columns = {"t": run.t} | {f"reference:{name}": x for name, x in run.references.items()} | {**run.outputs}
+    if run.input is not None:
+        columns["hub_torque"] = run.input
+    np.savetxt(path, np.transpose([*columns.values()]), delimiter=",", header=",".join(columns), comments="")
+
+
+def test_a_fit_by_the_command_saves_an_arm_whose_loops_are_those_of_the_rig(tmp_path, monkeypatch, capsys):
+    """The gain of the drive, 0.25 N m, and its dead time are in the file that margins and the others read."""
+    monkeypatch.chdir(tmp_path)
+    csv_of(open_run(times=0.25, n=300), "open.csv")
+    Path("rig.toml").write_text(to_toml(START))
+    free = "link.youngs_modulus,hub.inertia,drive.gain,drive.delay"
+    command_line = ("fit", "rig.toml", "--run", "open.csv", "--free", free, "--covariance", "--initial", "free")
+    found = answer(capsys, *command_line, "--save", "fitted.toml", "--figure", "fit.png")
+    assert found["explained"]
+    assert {row["noise_is"] for row in found["runs"]} == {"white at the output"}
+    assert Path("fit.png").stat().st_size > 1e4
+    chain = load_chain("fitted.toml")
+    assert chain.sampling.delay_samples == pytest.approx(0.7, abs=0.05)
+    posterior = load_posterior("fitted.posterior.json")
+    assert "motor.torque_constant" in posterior.keys
+    assert "drive.delay" not in posterior.keys
+    right = tfarm.margins(LAB, SERVO).in_band
+    law = {"K1": "2.8", "K2": "0.4", "Kp": "8"}
+    own = answer(capsys, "margins", "fitted.toml", *(f"--{name}={value}" for name, value in law.items()))
+    assert own["in_range"]["phase_margin_deg"] == pytest.approx(right.phase_margin.value, rel=0.01)
+    closed = closed_run(False, n=300, seed=6)
+    scaled = tfarm.HubFeedback(**{name: float(value) for name, value in law.items()})
+    sim = simulated(
+        tfarm.load("fitted.toml"), scaled, chain, task_of(0 * closed.t, closed.references["hub_angle"], 0.08)
+    )
+    for name in ("hub_angle", "root_moment"):
+        off = sim.measured[:, AT_HUB.index(name)] - closed.outputs[name]
+        assert np.std(off) == pytest.approx(SIGMA[name], rel=0.15)
+
+
+def test_what_belongs_to_runs_is_refused_without_one(capsys):
+    for option in (("--initial", "rest"), ("--period", "0.01")):
+        assert "--run" in refused(capsys, "fit", "sasaki2012-lab", "--free", "hub.inertia", *option)
+    assert "initial" in str(refusal(open_run, n=100, initial="moving"))
