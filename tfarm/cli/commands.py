@@ -367,6 +367,7 @@ def frf(
     window: str = "hann",
     segment: float | None = None,
     overlap: float | None = None,
+    held: bool = False,
     signal: SignalTexts = None,
     read: Any = record_of_options,
     csv: Annotated[Path | None, typer.Option("--save", "--csv", metavar="FILE")] = None,
@@ -383,11 +384,14 @@ def frf(
     window: hann for random excitation, boxcar for whole sweeps
     segment: length of a segment [s]; by default an eighth of the record
     overlap: share of a segment; by default 0.5, or 0 with boxcar
+    held: the input is held from each sample to the next, as by a DAC; not of a decimated record
     csv: write the response, for --measured and --data
     """
     from tfarm.fitting.signals import signal_of
     from tfarm.fitting.spectra import frequency_response
 
+    if held and (by := read.keywords["decimate"]) > 1:
+        refuse({"decimate": by}, "a filtered input is held no longer; leave --held out")
     signals = [signal_of(text) for text in signal or []]
     names = []
     for key, text in (("--output", output), ("--input", input)):
@@ -402,6 +406,7 @@ def frf(
         window=window,
         segment=segment,
         overlap=overlap,
+        is_held=held,
     )
     emit(found, csv=csv, rows=True, show=show)
 

@@ -30,6 +30,7 @@ from tfarm.exact.characteristic import characteristic
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exact.system import system_of
 from tfarm.fitting.data import NUMBER, Measured, Noise, in_parts
+from tfarm.fitting.held import held_parts
 from tfarm.fitting.run_model import DRIVE_DELAY, FitRun
 from tfarm.records import frozen
 from tfarm.response.signals import Signals
@@ -347,7 +348,14 @@ class Problem:
             delay = 0.0 if each.delay is None else self.value(point, each.delay)
             sensor = gain * np.exp(-1j * delay * each.data.omega)
             values, lacking = known[key]
-            found.append(Fraction(values[each.data.output] * sensor, values[each.data.input], lacking))
+            N = values[each.data.output]
+            D = values[each.data.input]
+            if each.data.held is not None:
+                s = (1j + share) * each.data.omega
+                under_drive = replace(arm, input=key[1])
+                hold, images = held_parts(under_drive, each.data.output, each.data.held, s)
+                N = N * hold + D * images
+            found.append(Fraction(N * sensor, D, lacking))
         return found
 
     def with_sensors(self, free: Sequence[str]) -> Problem:

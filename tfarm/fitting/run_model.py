@@ -37,9 +37,9 @@ from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.sensed import sensed_plant
 from tfarm.dsp.simulate import LinearLoop, quantisers, references_of
 from tfarm.errors import require
+from tfarm.fitting.held import modes_at_period
 from tfarm.fitting.runs import Run
 from tfarm.records import frozen
-from tfarm.spectrum import modes_below
 
 DRIVE_DELAY = "drive.delay"
 BIAS = "drive.bias"
@@ -353,12 +353,6 @@ class RunLoop:
         return np.repeat(u, self.ratio)[: self.run.count]
 
 
-def modes_of_run(arm: Arm, run: Run) -> int:
-    """Return the number of modes that a run is computed with: up to four times the sampling rate's half, two more."""
-    most = 20
-    return min(most, modes_below(arm, 4 * math.pi / run.period) + 2)
-
-
 def fit_run(arm: Arm, run: Run, chain: Chain) -> FitRun:
     """Return a run as a fit begins with it: deviations that are not known a tenth of their signal's."""
     sigma = []
@@ -369,7 +363,7 @@ def fit_run(arm: Arm, run: Run, chain: Chain) -> FitRun:
     if run.law is not None and run.law.period is not None:
         chain = replace(chain, sampling=replace(chain.sampling, period=run.law.period))
     is_moving = run.law is None if run.initial is None else run.initial == "free"
-    found = FitRun(run, chain, modes_of_run(arm, run), tuple(sigma), known, is_moving)
+    found = FitRun(run, chain, modes_at_period(arm, run.period), tuple(sigma), known, is_moving)
     # raises for a period that is no part of the controller's
     assert found.ratio
     return replace(found, own=len(found.own_names(arm)))
