@@ -5,7 +5,6 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import pytest
 
 import tfarm
 from tests.fitting.test_runs import LOOSE, T, chain_of, simulated, task_of

@@ -13,7 +13,7 @@ from scipy.stats import binom
 import tfarm
 from tests.shared import refusal
 from tests.shell import answer, refused
-from tfarm.arm import AT_HUB
+from tfarm.arm import AT_HUB, Law
 from tfarm.arm.chain import Actuator, Chain, Converters, Sampling, load_chain
 from tfarm.arm.writing import to_toml
 from tfarm.case import Case
@@ -27,6 +27,9 @@ from tfarm.fitting.model import Problem, free_parameters, with_run_numbers
 from tfarm.fitting.posterior import load_posterior
 from tfarm.fitting.run_model import chance_of_white, fit_run
 from tfarm.fitting.runs import Run
+from tfarm.plots.frequency import fit_runs
+from tfarm.report.page import ArmReport
+from tfarm.report.response_sections import fit_section
 from tfarm.schema import to_dict
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -121,7 +124,7 @@ def test_the_input_of_a_linear_loop_is_that_of_the_simulator(arm, converters):
 
 
 def test_a_controller_alone_answers_errors_as_its_difference_equation():
-    law = tfarm.Law.of_gains(SERVO)
+    law = Law({"hub_angle": ([2.0, 1.0], [0.01, 1.0]), "root_moment": ([0.5], [0.02, 1.0])})
     case = Case(LAB, law, chain_of())
     acting, late = acting_law(case)
     loop = LinearLoop(sensed_plant(LAB, late, AT_HUB, 2).together, acting, late)
@@ -165,16 +168,23 @@ def test_bias_offsets_and_drift_are_found_again():
 
 
 def test_under_a_controller_bias_and_offset_are_found_again():
+    """The controller reads the moment with its offset."""
     reference = np.cumsum(command(800)) * T
-    bias = 0.02
-    found = simulated(LAB, SERVO, chain_of(), task_of(0 * reference, reference, bias))
-    outputs = with_noise(signals_of(found), 4)
+    planted = {"drive.bias": 0.02, "offset of hub_angle": 0.0, "offset of root_moment": 0.5}
+
+    def controller(m):
+        hub = SERVO.Kp * (m.angle_reference - m.hub_angle) - SERVO.K1 * m.hub_rate
+        return hub - SERVO.K2 * (m.vibration + planted["offset of root_moment"])
+
+    case = Case(LAB, SERVO, chain_of())
+    task = task_of(0 * reference, reference, planted["drive.bias"])
+    outputs = with_noise(signals_of(Simulator(case, task, count=MODES).controller(controller)), 4)
+    outputs["root_moment"] += planted["offset of root_moment"]
     sigma = {name: SIGMA[name] for name in outputs}
     run = Run(period=T, outputs=outputs, references={"hub_angle": reference}, law=SERVO, sigma=sigma)
     own = own_numbers(run, chain_of())
-    assert abs(own["drive.bias"][0] - bias) < 4 * own["drive.bias"][1] < bias
-    for name in outputs:
-        assert abs(own[f"offset of {name}"][0]) < 4 * own[f"offset of {name}"][1]
+    for name, value in planted.items():
+        assert abs(own[name][0] - value) < 4 * own[name][1] < max(value, 0.01)
 
 
 def test_a_record_may_begin_while_the_arm_moves():
@@ -345,22 +355,25 @@ def test_a_wrong_arm_leaves_residuals_that_are_not_white():
     assert found.verdict == "fitted, but the arm does not explain the data"
 
 
-def test_limits_of_the_chain_that_are_reached_are_named():
+@pytest.mark.parametrize("law", [None, SERVO])
+def test_limits_of_the_chain_that_are_reached_are_named(law):
     """What the simulator has with a limit of 0.3 N m less what it has without."""
     limited = replace(chain_of(), actuator=Actuator(torque_limit=0.3), converters=Converters(encoder_counts=500))
-    reference = np.cumsum(command(300, size=2.0)) * T
-    task = task_of(0 * reference, reference)
-    free, held = (signals_of(simulated(LAB, SERVO, each, task)) for each in (chain_of(), limited))
+    reference = 0.0 if law is None else np.cumsum(command(300, size=2.0)) * T
+    task = task_of(command(300) * (law is None), np.zeros(300) + reference)
+    chains = (chain_of(), limited)
+    free, held = (signals_of(simulated(LAB, law or LOOSE, each, task)) for each in chains)
     outputs = with_noise(free, 2)
-    run = Run(period=T, outputs=outputs, references={"hub_angle": reference}, law=SERVO)
+    of_loop = {"references": {"hub_angle": task.hub_angle}, "law": law} if law else {"input": task.feedforward}
+    run = Run(period=T, outputs=outputs, **of_loop)
     model = replace(fit_run(LAB, run, limited), sigma=(1e-3, 0.01), count=MODES)
     effects = model.chain_effects(LAB, lambda place: math.nan)
     right = [abs(held[name] - free[name]).max() / sigma for name, sigma in zip(outputs, (1e-3, 0.01), strict=True)]
     np.testing.assert_allclose(effects, right, rtol=1e-9)
     step = 2 * math.pi / 500
     assert model.rescaled(np.zeros(600), 1.0).sigma[0] == pytest.approx(step / math.sqrt(12))
-    arm = fit(LAB, [], ["hub.inertia"], runs=[run], chain=limited, profile=False)
-    assert any("(saturation)" in note for note in arm.run_notes)
+    found = fit(LAB, [], ["hub.inertia"], runs=[run], chain=limited, profile=False)
+    assert any("(saturation)" in note for note in found.run_notes)
 
 
 def csv_of(run, path):
@@ -404,3 +417,16 @@ def test_what_belongs_to_runs_is_refused_without_one(capsys):
     for option in (("--initial", "rest"), ("--period", "0.01")):
         assert "--run" in refused(capsys, "fit", "sasaki2012-lab", "--free", "hub.inertia", *option)
     assert "initial" in str(refusal(open_run, n=100, initial="moving"))
+
+
+def test_the_pages_of_a_fit_have_its_runs():
+    found = fit_of_open_run()
+    section = fit_section(ArmReport(found.arm, found.chain, (), found), count=2)
+    stems = [each.stem for each in section.blocks]
+    assert stems[:4] == ["fit-runs", "fit", "fit-signals", "fit-own"]
+    assert not {"fit-overlay", "fit-resonances", "fit-band"} & {*stems}
+    assert any("drift of the rigid mode" in words for words in section.words)
+    measured, residual, *_ = fit_runs(found)
+    assert measured.lines[0].get_ydata() == pytest.approx(found.problem.runs[0].measured[0])
+    off = measured.lines[1].get_ydata() - measured.lines[0].get_ydata()
+    assert residual.lines[0].get_ydata() == pytest.approx(off)
