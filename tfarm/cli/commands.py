@@ -1,6 +1,7 @@
 """The commands on an arm and on measured data.  Packages are imported inside them: `tfarm --help` needs none."""
 
 import math
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, cast
@@ -26,6 +27,7 @@ from tfarm.cli.options import (
     outputs_on,
     record_of_options,
     refuse,
+    runs_of_options,
 )
 from tfarm.cli.output import emit, emit_loop, emit_record
 from tfarm.cli.progress import advance, print_line
@@ -288,7 +290,10 @@ def fit(
     bounds: Annotated[list[Any] | None, typer.Option(metavar="KEY=LO,HI", parser=pair)] = None,
     prior: Annotated[list[Any] | None, typer.Option(metavar="KEY=MEAN,STD", parser=pair)] = None,
     mode: Annotated[list[str] | None, typer.Option(metavar="N=HZ,RATIO")] = None,
+    initial: Annotated[str | None, typer.Option(metavar="rest|free")] = None,
     covariance: bool = False,
+    read: Any = runs_of_options,
+    chain: Any = chain_of_options,
     save: File = None,
     png: Png = None,
     report: bool = False,
@@ -296,19 +301,21 @@ def fit(
     theory: TheoryName = None,
     show: Any = emit_record,
 ) -> None:
-    """Fit of an arm's numbers to measured responses and ring-downs.
+    """Fit of an arm's numbers to measured responses, runs over time and ring-downs.
 
-    Each number has its confidence interval.
+    Each number has its confidence interval.  The runs are those of the exact sampled plant, through the chain of the
+    arm's file or of --dsp.
 
     Options:
     data: measured response; may be repeated
-    free: free numbers: keys of the arm's file, such as link.youngs_modulus, and gain, delay of each sensor
+    free: keys of the arm's file, such as link.youngs_modulus; gain, delay; of runs drive.gain, drive.delay, gain:SIGNAL
     start: first value, if not the arm's
     bounds: bounds of a number
     prior: prior mean and deviation
     mode: mode of a ring-down: 1=2.52hz,0.006, with standard deviations 1=2.52hz~0.01,0.006~0.001
+    initial: motion of the runs at their first sample; by default free in open loop, rest under a controller
     covariance: intervals by the covariance alone, without profiles
-    save: write the fitted arm to this TOML file
+    save: write the fitted arm to this TOML file, with the chain of its runs
     report: write the pages of the fitted arm
     out: the folder of the pages
     """
@@ -318,13 +325,18 @@ def fit(
 
     subject = load_arm(arm, theory)
     measured = [data_of(text) for text in data or []]
+    runs = [replace(each, initial=cast("Any", initial)) for each in read(subject)]
     page = None
+    if not runs:
+        refuse({"initial": initial, **chain.keywords}, "is of runs: give --run too")
     for each in measured:
         ratio.check_unit(subject, each)
     found = tfarm.fit(
         subject,
         measured,
         [key.strip() for key in free.split(",") if key.strip()],
+        runs=runs,
+        chain=chain(arm),
         rings=[model.mode_of(text) for text in mode or []],
         profile=not covariance,
         progress=advance,
@@ -355,6 +367,7 @@ def frf(
     window: str = "hann",
     segment: float | None = None,
     overlap: float | None = None,
+    held: bool = False,
     signal: SignalTexts = None,
     read: Any = record_of_options,
     csv: Annotated[Path | None, typer.Option("--save", "--csv", metavar="FILE")] = None,
@@ -371,11 +384,14 @@ def frf(
     window: hann for random excitation, boxcar for whole sweeps
     segment: length of a segment [s]; by default an eighth of the record
     overlap: share of a segment; by default 0.5, or 0 with boxcar
+    held: the input is held from each sample to the next, as by a DAC; not of a decimated record
     csv: write the response, for --measured and --data
     """
     from tfarm.fitting.signals import signal_of
     from tfarm.fitting.spectra import frequency_response
 
+    if held and (by := read.keywords["decimate"]) > 1:
+        refuse({"decimate": by}, "a filtered input is held no longer; leave --held out")
     signals = [signal_of(text) for text in signal or []]
     names = []
     for key, text in (("--output", output), ("--input", input)):
@@ -390,6 +406,7 @@ def frf(
         window=window,
         segment=segment,
         overlap=overlap,
+        is_held=held,
     )
     emit(found, csv=csv, rows=True, show=show)
 

@@ -12,6 +12,7 @@
 `solve`: the search for the least sum of squares.
 `intervals`: intervals of the numbers, and the directions that the data leave open.
 `fit`: the fitted arm, and arms drawn from its posterior.
+`result_rows`: rows of a fit, of its responses and of its runs.
 `misses`: responses that the fitted curve misses, and the changes that would help.
 `posterior`: the distribution of the fitted numbers, and their scatter between records.
 """

@@ -54,7 +54,8 @@ class Measured:
 
     Both signals are named as in `response.signals` ("tip_acceleration", "strain@0.05"), `input` also as an arm's input
     is ("hub_torque").  `sigma` (n,) is the standard deviation of the real and of the imaginary part, each; `coherence`
-    (n,) between 0 and 1 is that of an estimate from a number of independent `averages`.  `source` names the file,
+    (n,) between 0 and 1 is that of an estimate from a number of independent `averages`.  The input was `held` over each
+    period [s] and the output sampled with it, or is continuous where that is None.  `source` names the file,
     `digest` is its SHA-256.
 
     Raises ParameterError for shapes that differ, frequencies that are not positive or do not ascend, values that are no
@@ -68,6 +69,10 @@ class Measured:
     sigma: Real | None = None
     coherence: Real | None = None
     averages: int | None = None
+    held: Annotated[
+        float | None,
+        Quantity(key="held_s", help="period [s] over which the input is held; none where it is not"),
+    ] = None
     source: Annotated[str, Quantity("file", help="file that the response was read from")] = "array"
     digest: Annotated[str, Quantity(key="sha256", help="SHA-256 of that file")] = ""
 
@@ -145,8 +150,9 @@ class Measured:
         ):
             if of is not None:
                 rows.append(Column(key, title, of=of, digits=singly(general, 6)))
-        if self.averages is not None:
-            rows.append(Column("averages", "averages", of=[self.averages] * self.points))
+        for key, value in (("averages", self.averages), ("held", self.held)):
+            if value is not None:
+                rows.append(Column(key, key, of=[value] * self.points))
         return Table(columns=tuple(rows))
 
 
@@ -384,11 +390,15 @@ def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Meas
         if averages is not None:
             wrong = (averages != averages[0]) | (averages < 1) | (averages != np.round(averages))
             sheet.refuse("averages", wrong, "a whole number of averages, the same in every row")
+        held = sheet.columns.get("held")
+        if held is not None:
+            sheet.refuse("held", (held != held[0]) | (held <= 0), "a positive period, the same in every row")
         return Measured(
             output=output,
             input=input,
             omega=omega,
             values=values,
+            held=None if held is None else float(held[0]),
             sigma=sheet.columns.get("sigma"),
             coherence=sheet.columns.get("coherence"),
             averages=None if averages is None else int(averages[0]),
@@ -412,7 +422,7 @@ def _frequencies(sheet: Sheet) -> Real:
     """Return the frequencies [rad/s], once the header is known to be one and they ascend."""
     # its unit, and rad/s in one
     frequencies = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}
-    known = (*frequencies, *VALUES, "coherence", "sigma", "averages")
+    known = (*frequencies, *VALUES, "coherence", "sigma", "averages", "held")
     for name in sheet.columns:
         require(name in known, "header", name, did_you_mean(name.lower(), known))
     found = [name for name in frequencies if name in sheet.columns]

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from tfarm.arm import Arm, must_be_arm
-from tfarm.arm.chain import Chain
+from tfarm.arm.chain import Chain, file_text
 from tfarm.arm.schema import file_key
 from tfarm.arm.writing import to_toml
 from tfarm.arrays import Complex, Real
@@ -41,11 +41,11 @@ from tfarm.fitting.model import (
 from tfarm.fitting.overlay import ResonanceShift, resonance_shifts
 from tfarm.fitting.posterior import SUFFIX, Posterior, Repeats, posterior_of, repeats
 from tfarm.fitting.ratio import ratio_of
+from tfarm.fitting.result_rows import FittedResponse, RunResults
 from tfarm.fitting.run_model import fit_run
 from tfarm.fitting.runs import DRIVE_GAIN, GAIN_KEY, Run, commanded
 from tfarm.fitting.solve import (
     FIT_SEED,
-    Solution,
     best_solution,
     is_explained,
     nearest_minimum,
@@ -58,28 +58,8 @@ from tfarm.schema import Quantity
 from tfarm.stopping import Progress
 
 
-class FittedResponse(NamedTuple):
-    """A response of the fit."""
-
-    name: Annotated[str, Quantity(help="output/input as on the command line")]
-    label: Annotated[str, Quantity("response", key="response", help="output and input in words")]
-    unit: Annotated[str, Quantity("unit", help="SI unit of the response")]
-    source: Annotated[str, Quantity(help="file that the response was read from")]
-    sha256: Annotated[str, Quantity(help="SHA-256 of that file")]
-    frequencies: Annotated[int, Quantity("frequencies", help="number of measured frequencies")]
-    low: Annotated[float, Quantity("from", "Hz", key="from_hz", help="first measured frequency")]
-    high: Annotated[float, Quantity("to", "Hz", key="to_hz", help="last measured frequency")]
-    noise: Annotated[str, Quantity("noise by", help="origin of the standard deviation of its values")]
-    chi_squared: Annotated[
-        float,
-        Quantity(
-            "chi-squared", digits=4, help="its share of the sum of squared residuals over their deviations"
-        ),
-    ]
-
-
 @frozen(kw_only=True)
-class Fit(Solution):
+class Fit(RunResults):
     """The best point of the search with intervals: an arm fitted to measured responses.
 
     `parameters` are the free numbers with their intervals, `not_determined` the combinations that the data leave open;
@@ -140,7 +120,7 @@ class Fit(Solution):
     ]:
         """A row a response."""
         rows = []
-        for one, residuals in zip(self.problem.responses, self.parts, strict=True):
+        for one, residuals in zip(self.problem.responses, self.parts, strict=False):
             of = one.data
             names = (of.name, of.label, of.unit, of.source, of.digest)
             chi_squared = float(residuals @ residuals)
@@ -262,6 +242,9 @@ class Fit(Solution):
         """Convergence, identified numbers, whether the model is rejected, and what is missed."""
         known = sum(each.identified for each in self.parameters)
         share = f"reduced chi-squared = {self.chi_squared / max(self.freedom, 1):.3g}"
+        if self.problem.runs and (self.is_explained or not self.has_known_noise):
+            white = "white" if self.is_explained else "not white"
+            share = f"residuals are {white} (chance {self.chance_of_white:.2g})"
         tests = {
             None: "noise estimated from the residuals: the model cannot be tested",
             True: f"model not rejected: {share}",
@@ -328,7 +311,9 @@ def fit(
             break
         except BetterError as better:
             (there,) = better.args
-            found = replace(nearest_minimum(there.problem, there.point), starts=found.starts)
+            pairs = zip(found.problem.parameters, there.problem.parameters, there.point.tolist(), strict=True)
+            point = np.array([own.coordinate(each.value(x)) for own, each, x in pairs])
+            found = replace(nearest_minimum(found.problem, point), starts=found.starts)
     else:
         # one valley after another: no end of it
         found = replace(found, converged=False)
@@ -368,6 +353,10 @@ def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
         texts.append(
             f"Fitted to {each.label} of {one_line(Path(each.source).name, longest_name)}, SHA-256 {digest}."
         )
+    for run in (one.run for one in fit.problem.runs):
+        loop = "in open loop" if run.law is None else f"under {run.law.name}"
+        name = one_line(Path(run.source).name, longest_name)
+        texts.append(f"Fitted to a run of {name} {loop}, SHA-256 {run.digest or 'none'}.")
     return (*texts, *(f"Of the fit: {words}." for words in fit.not_determined))
 
 
@@ -488,8 +477,11 @@ def stable_share(arms: Sequence[Arm], ranges: Sequence[tuple[float, float]]) -> 
 
 
 def save_fit(fit: Fit, path: Path) -> None:
-    """Write the fitted arm, and its posterior to a file of the same name; only the arm where that is a stream."""
-    write_file(path, to_toml(fit.arm).encode(), key="--save")
+    """Write the fitted arm with the chain of its runs, and its posterior to a file of the same name.
+
+    Only the arm where that is a stream.
+    """
+    write_file(path, file_text(fit.arm, fit.chain).encode(), key="--save")
     if path.is_file() and not is_standard_output(path) and fit.posterior.numbers:
         content = f"{fit.posterior.model_dump_json(indent=1)}\n".encode()
         write_file(path.with_name(f"{path.stem}{SUFFIX}"), content, key="--save")

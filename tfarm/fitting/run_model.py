@@ -25,20 +25,21 @@ import numpy as np
 from scipy.special import chdtrc
 
 from tfarm.arm import AT_HUB, Arm
-from tfarm.arm.chain import Chain
+from tfarm.arm.chain import Chain, Sampling
 from tfarm.arrays import Real
 from tfarm.case import Case
+from tfarm.dsp import kernel
 from tfarm.dsp.discretise import acting_law
 from tfarm.dsp.plant import Plant
 from tfarm.dsp.pulse import PulseTransfer
 from tfarm.dsp.results import ideal_chain
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.sensed import sensed_plant
-from tfarm.dsp.simulate import LinearLoop, references_of
+from tfarm.dsp.simulate import LinearLoop, quantisers, references_of
 from tfarm.errors import require
+from tfarm.fitting.held import modes_at_period
 from tfarm.fitting.runs import Run
 from tfarm.records import frozen
-from tfarm.spectrum import modes_below
 
 DRIVE_DELAY = "drive.delay"
 BIAS = "drive.bias"
@@ -58,6 +59,7 @@ class FitRun:
     `is_known` (outputs,) is whether a deviation was given, or is that of the residuals.  `gains` has the places of
     sensors' gains in the vector of what is searched for, `delay` that of the drive's dead time.  `own` is how many
     numbers it has of its own: with `is_moving` also the hub's drift and amplitudes of the lowest modes at the start.
+    One that `is_ideal` has no steps and limits of its chain.
     """
 
     run: Run
@@ -70,6 +72,7 @@ class FitRun:
     through_loop: bool = False
     gains: tuple[tuple[str, int], ...] = ()
     delay: int | None = None
+    is_ideal: bool = True
 
     @property
     def size(self) -> int:
@@ -85,6 +88,13 @@ class FitRun:
     def log_deviation(self) -> float:
         """The sum of ln sigma over all residuals."""
         return self.run.count * math.fsum(map(math.log, self.sigma))
+
+    @property
+    def least_deviation(self) -> Real:
+        """The deviation (outputs,) of rounding to the steps of the chain's converters, step/sqrt(12)."""
+        (encoder, moment, _) = quantisers(self.chain)[:, 0]
+        steps = {"hub_angle": encoder, "root_moment": moment}
+        return np.array([steps.get(name, 0.0) for name in self.run.names]) / math.sqrt(12)
 
     @cached_property
     def measured(self) -> Real:
@@ -120,32 +130,49 @@ class FitRun:
         """Return it with each deviation that is not known as its own residuals say, times the root of a share."""
         rows = residuals.reshape(len(self.sigma), -1)
         factors = np.maximum(np.sqrt((rows**2).mean(axis=1) * share), 1e-12)
-        sigma = np.array(self.sigma) * np.where(self.is_known, 1.0, factors)
-        return replace(self, sigma=tuple(sigma.tolist()))
+        sigma = np.maximum(np.array(self.sigma) * factors, self.least_deviation)
+        return replace(self, sigma=tuple(np.where(self.is_known, self.sigma, sigma).tolist()))
 
     # ------------------------------------------------------------ outputs
 
     def respond(self, arm: Arm, value: Callable[[int], float]) -> RunResponse:
         """Return the outputs of an arm; `value` gives the number of a place in what is searched for."""
-        run = self.run
-        steady = np.ones(run.count)
         pulse = self.pulse(arm, value)
-        rows = [pulse.plant.outputs.index(name) for name in run.names]
-        if run.law is None:
-            assert run.input is not None
-            found = pulse.held_response(run.input)
-            columns = [pulse.held_response(steady), *self._free(pulse, rows)]
-        else:
-            loop = self.loop(arm, value)
-            zero = 0 * steady
-            found = pulse.held_response(loop.input(loop.wanted, zero))
-            at_once = PulseTransfer(pulse.plant, replace(pulse.sampling, delay_samples=0.0))
-            answer = pulse.held_response(loop.input(0 * loop.wanted, steady))
-            columns = [at_once.held_response(steady) + answer]
-            for on_signals in self._free(pulse, rows):
-                answer = pulse.held_response(loop.input(-loop.read(on_signals), zero))
-                columns.append(on_signals + answer)
+        loop = None if self.run.law is None else self.loop(arm, value)
+        rows = self.rows(pulse)
+        found = pulse.held_response(self.commands(loop))
+        columns = [self.on_torque(pulse, loop, np.ones(self.run.count))]
+        for on_signals in self._free(pulse, rows):
+            if loop is not None:
+                on_hub = np.zeros(self.run.count)
+                on_signals = on_signals + pulse.held_response(loop.input(-loop.read(on_signals), on_hub))
+            columns.append(on_signals)
         return RunResponse(found[rows], np.array(columns)[:, rows])
+
+    def rows(self, pulse: PulseTransfer) -> list[int]:
+        """Return the places of the run's signals among those of its plant."""
+        return [pulse.plant.outputs.index(name) for name in self.run.names]
+
+    def commands(self, loop: RunLoop | None, offsets: Real | None = None) -> Real:
+        """Return the input (n,): that of the record, or of its controller, whose sensors have offsets (outputs,)."""
+        run = self.run
+        if loop is None:
+            assert run.input is not None
+            return run.input if self.is_ideal else converted(run.input, quantisers(self.chain)[kernel.DAC])
+        wanted = loop.wanted
+        if offsets is not None:
+            names = loop.linear.plant.outputs
+            off = np.zeros((len(names), run.count))
+            off[[names.index(name) for name in run.names]] = offsets[:, None]
+            wanted = wanted - loop.read(off)
+        return loop.input(wanted, np.zeros(run.count))
+
+    def on_torque(self, pulse: PulseTransfer, loop: RunLoop | None, torque: Real) -> Real:
+        """Return the signals (all of the plant, n) of a torque (n,) on the hub, and of a controller's answer to it."""
+        if loop is None:
+            return pulse.held_response(torque)
+        at_once = PulseTransfer(pulse.plant, replace(pulse.sampling, delay_samples=0.0))
+        return at_once.held_response(torque) + pulse.held_response(loop.input(0 * loop.wanted, torque))
 
     def pulse(self, arm: Arm, value: Callable[[int], float]) -> PulseTransfer:
         """Return the plant of the run's signals at the samples of its record, times the gains of sensors.
@@ -170,16 +197,19 @@ class FitRun:
 
     def _chain(self, value: Callable[[int], float]) -> Chain:
         """Return the chain without steps and limits, of an open loop at the record's period, with the dead time."""
-        chain = ideal_chain(self.chain)
+        chain = ideal_chain(self.chain) if self.is_ideal else self.chain
         if self.run.law is None:
             chain = at_period(chain, self.run.period)
+        return replace(chain, sampling=self.dead_time(chain.sampling, value))
+
+    def dead_time(self, sampling: Sampling, value: Callable[[int], float]) -> Sampling:
+        """Return the sampling with the drive's dead time where that is free."""
         if self.delay is None:
-            return chain
-        delay = value(self.delay) / chain.sampling.period
-        return replace(chain, sampling=replace(chain.sampling, delay_samples=delay))
+            return sampling
+        return replace(sampling, delay_samples=value(self.delay) / sampling.period)
 
     def _free(self, pulse: PulseTransfer, rows: Sequence[int]) -> Iterator[Real]:
-        """Yield outputs (names, n) by a unit of each offset, of the hub's drift, and of modes at the start."""
+        """Yield outputs (names, n) by a unit of each offset, of angular momentum and of modes at the start."""
         n = self.run.count
         plant = pulse.plant
         for row in rows:
@@ -208,11 +238,28 @@ class FitRun:
         found = [BIAS, *(f"offset of {name}" for name in self.run.names)]
         if self.is_moving:
             plant = sensed_plant(arm, self._chain(lambda _: 0.0), self.run.names, self.count).together
-            found += ["drift of the hub"] * bool(plant.rigid[:, 0].any())
+            found += ["angular momentum at the start"] * bool(plant.rigid[:, 0].any())
             for pole in self._moving(plant):
                 mode = f"mode {plant.mode[pole]}" if plant.mode[pole] else "hub or filter"
                 found += [f"{mode} at the start"] * (1 + (plant.poles[pole].imag > 0))
         return found
+
+    def chain_effects(self, arm: Arm, value: Callable[[int], float]) -> Real:
+        """Return the largest differences (outputs,) by steps and limits of the chain, over the deviations."""
+        ideal, stepped = (
+            each.commands(None if self.run.law is None else each.loop(arm, value))
+            for each in (self, replace(self, is_ideal=False))
+        )
+        pulse = self.pulse(arm, value)
+        off = pulse.held_response(stepped - ideal)[self.rows(pulse)]
+        return np.asarray(abs(off).max(axis=1) / self.sigma)
+
+    def drift(self, arm: Arm, value: Callable[[int], float]) -> float:
+        """Return the hub's angle [rad] at the end of an open loop by a unit of a bias; 0 of one that does not drift."""
+        if self.run.law is not None:
+            return 0.0
+        turning = sensed_plant(arm, self._chain(value), ("hub_angle",), self.count).together.rigid[0, 0]
+        return float(turning * self.run.t[-1] ** 2 / 2)
 
     # ------------------------------------------------------------ residuals
 
@@ -253,7 +300,7 @@ class FitRun:
         """Return (1 + L) of deviations (rows, outputs, n): what the noise of sensors was before it went round."""
         pulse = self.pulse(arm, value)
         loop = self.loop(arm, value)
-        rows = [pulse.plant.outputs.index(name) for name in self.run.names]
+        rows = self.rows(pulse)
         found = []
         for part in parts:
             read = np.zeros((len(pulse.plant.outputs), self.run.count))
@@ -306,12 +353,6 @@ class RunLoop:
         return np.repeat(u, self.ratio)[: self.run.count]
 
 
-def modes_of_run(arm: Arm, run: Run) -> int:
-    """Return the number of modes that a run is computed with: up to four times the sampling rate's half, two more."""
-    most = 20
-    return min(most, modes_below(arm, 4 * math.pi / run.period) + 2)
-
-
 def fit_run(arm: Arm, run: Run, chain: Chain) -> FitRun:
     """Return a run as a fit begins with it: deviations that are not known a tenth of their signal's."""
     sigma = []
@@ -321,10 +362,19 @@ def fit_run(arm: Arm, run: Run, chain: Chain) -> FitRun:
     known = tuple(name in run.sigma for name in run.names)
     if run.law is not None and run.law.period is not None:
         chain = replace(chain, sampling=replace(chain.sampling, period=run.law.period))
-    found = FitRun(run, chain, modes_of_run(arm, run), tuple(sigma), known, is_moving=run.law is None)
+    is_moving = run.law is None if run.initial is None else run.initial == "free"
+    found = FitRun(run, chain, modes_at_period(arm, run.period), tuple(sigma), known, is_moving)
     # raises for a period that is no part of the controller's
     assert found.ratio
     return replace(found, own=len(found.own_names(arm)))
+
+
+def converted(values: Real, row: Real) -> Real:
+    """Return values on the steps and in the range of a converter, a row of `quantisers`."""
+    step, low, high = row
+    if step:
+        values = np.rint(values / step) * step
+    return np.clip(values, low, high)
 
 
 def at_period(chain: Chain, period: float) -> Chain:

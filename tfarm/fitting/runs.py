@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from tfarm.arm import AT_HUB, Arm, Law, Motor
 from tfarm.arm.law import REFERENCE, as_law
 from tfarm.arrays import Real
-from tfarm.errors import MISSING, require
+from tfarm.errors import MISSING, must_be_known, require
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.fitting.data import check_signal
 from tfarm.records import frozen
@@ -31,7 +31,8 @@ class Run:
     `outputs` are measured signals by name ("hub_angle", "root_moment", "strain@0.05"), `input` is the commanded input
     of the plant, held from each sample to the next.  Under a `law` it may be left out, and `references` of the
     hub's angle, rate or moment take its place; a `law` that is None is an open loop.
-    `sigma` has the standard deviations of outputs that are known; others follow from the residuals.
+    `sigma` has the standard deviations of outputs that are known; others follow from the residuals.  `initial` is
+    "rest" or "free" at the first sample; by default an open loop is free, and a closed one rests.
     Raises ParameterError for arrays of other lengths, values that are no numbers, and a record without outputs, without
     input and references, or of an open loop without an input.
     """
@@ -42,6 +43,7 @@ class Run:
     references: Mapping[str, Real] = field(default_factory=dict)
     law: Law | None = None
     sigma: Mapping[str, float] = field(default_factory=dict)
+    initial: Literal["rest", "free"] | None = None
     source: str = "array"
     digest: str = ""
     note: str = ""
@@ -58,6 +60,7 @@ class Run:
             require(np.isfinite(values).all(), name, "nan or inf", "finite numbers; cut the record there")
         for name in self.outputs:
             check_signal(name, "output")
+        must_be_known("initial", self.initial or "rest", ("rest", "free"))
         for name in self.references:
             require(name in AT_HUB, "reference", name, f"of one of {', '.join(AT_HUB)}")
         for name, value in self.sigma.items():

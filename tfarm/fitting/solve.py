@@ -267,18 +267,28 @@ def solution_of_runs(problem: Problem, draws: int) -> Solution:
     if problem.responses:
         points.append(best_solution(replace(problem, runs=())).point)
     least = periods * 2 * math.pi / first_frequency(problem.arm(start))
+    best = rescale_noise(continued_minimum(problem, points, least))
+    if not any(each.reads_all for each in problem.runs):
+        return best
+    around = tuple(replace(each, through_loop=each.reads_all) for each in best.problem.runs)
+    other = rescale_noise(continued_minimum(replace(best.problem, runs=around), [*points, best.point], least))
+    return min(best, other, key=lambda each: each.misfit)
+
+
+def continued_minimum(problem: Problem, points: Sequence[Real], least: float) -> Solution:
+    """Return the least sum of squares that searches from points come to, over parts of the runs from `least` [s] on."""
+    # of a coordinate: points so near are one
+    apart = 0.02
     whole = max(each.run.count * each.run.period for each in problem.runs)
     for duration in (least, math.sqrt(least * whole), whole):
         part = replace(problem, runs=tuple(each.until(duration) for each in problem.runs))
-        kept = sorted(points, key=partial(sum_of_squares, part))[: 3 if duration == least else 2]
+        some: list[Real] = []
+        for point in sorted(points, key=partial(sum_of_squares, part)):
+            if all(abs(point - each).max() > apart for each in some):
+                some.append(point)
+        kept = some[: 3 if duration == least else 2]
         points = [nearest_minimum(part, each, evaluations=20).point for each in kept]
-    best = min((nearest_minimum(problem, each) for each in points), key=lambda each: each.chi_squared)
-    best = rescale_noise(best)
-    if any(each.reads_all for each in problem.runs):
-        around = tuple(replace(each, through_loop=each.reads_all) for each in best.problem.runs)
-        other = rescale_noise(nearest_minimum(replace(best.problem, runs=around), best.point))
-        best = min(best, other, key=lambda each: each.misfit)
-    return best
+    return min((nearest_minimum(problem, each) for each in points), key=lambda each: each.chi_squared)
 
 
 def nearest_to_start(found: Solution) -> Solution:

@@ -102,10 +102,12 @@ def frequency_response(
     window: str = "hann",
     segment: float | None = None,
     overlap: float | None = None,
+    is_held: bool = False,
 ) -> Estimate:
     """Return the response `output`/`input` of a record, from its signals of these names.
 
     `segment` [s] is by default an eighth of the record, `overlap` half of it with a window that tapers, else none.
+    An input that `is_held` from each sample to the next has the response of samples to it (`held`).
     Raises ParameterError for signals that are not there, for a segment that leaves no two of them, and for an input
     that does not move.
     """
@@ -134,6 +136,7 @@ def frequency_response(
         values=values,
         coherence=coherence,
         averages=max(1, math.floor(averages)),
+        held=recording.period if is_held else None,
         source=recording.source,
         digest=recording.digest,
     )
