@@ -26,6 +26,7 @@ from tfarm.case import Case
 from tfarm.digits import general
 from tfarm.fitting.decays import fit_ringdown
 from tfarm.fitting.recording import compare_run, load_run, overshoot, read_recording
+from tfarm.fitting.signals import UNITS
 from tfarm.spectrum.table import hub_locked
 from tfarm.synthesis.requirements import MEASURES
 from tfarm.synthesis.structures import STRUCTURES
@@ -198,6 +199,15 @@ def rig_laws() -> list[str]:
     return markdown_table(
         ("controller", "sampled loop", "overshoot, measured", "overshoot, exact loop"), rows
     )
+
+
+@table
+def units() -> list[str]:
+    """Units of records by the SI unit that they are converted to."""
+    rows: dict[str, list[str]] = {}
+    for name, (unit, _) in UNITS.items():
+        rows.setdefault(unit, []).append(f"`{name}`")
+    return markdown_table(("SI unit", "units"), ((unit, ", ".join(names)) for unit, names in rows.items()))
 
 
 @table

@@ -15,6 +15,7 @@ from tfarm.cli.options import (
     File,
     InputName,
     Png,
+    SignalTexts,
     TheoryName,
     chain_of_options,
     interval,
@@ -23,6 +24,7 @@ from tfarm.cli.options import (
     name_and,
     numbers,
     outputs_on,
+    record_of_options,
     refuse,
 )
 from tfarm.cli.output import emit, emit_loop, emit_record
@@ -34,7 +36,10 @@ measuring_command = partial(add_command, "Measure")
 RecordName = Annotated[
     Path,
     typer.Argument(
-        metavar="RECORD", exists=True, help="CSV or .mat file: t [s] and signals", show_default=False
+        metavar="RECORD",
+        exists=True,
+        help="CSV, .mat, HDF5, Parquet or UFF file: t [s] and signals",
+        show_default=False,
     ),
 ]
 pair = name_and(numbers("KEY=NUMBER,NUMBER", 2))
@@ -350,6 +355,8 @@ def frf(
     window: str = "hann",
     segment: float | None = None,
     overlap: float | None = None,
+    signal: SignalTexts = None,
+    read: Any = record_of_options,
     csv: Annotated[Path | None, typer.Option("--save", "--csv", metavar="FILE")] = None,
     show: Any = emit_record,
 ) -> None:
@@ -358,7 +365,7 @@ def frf(
     The estimate is that of averaged cross-spectra.
 
     Options:
-    input: such as hub_torque; or hub_torque=COLUMN of the record
+    input: such as hub_torque; or hub_torque=COLUMN of the record, as of --signal
     output: such as tip_acceleration; or tip_acceleration=COLUMN
     estimator: H1 (noise on the output), H2 (on the input) or Hv
     window: hann for random excitation, boxcar for whole sweeps
@@ -366,21 +373,21 @@ def frf(
     overlap: share of a segment; by default 0.5, or 0 with boxcar
     csv: write the response, for --measured and --data
     """
-    from tfarm.fitting import recording
+    from tfarm.fitting.signals import signal_of
+    from tfarm.fitting.spectra import frequency_response
 
+    signals = [signal_of(text) for text in signal or []]
     names = []
-    columns = []
-    for text in (output, input):
-        name, sign, column = text.partition("=")
-        require(column or not sign, "signal", text, "write NAME=COLUMN, such as tip_acceleration=acc1")
-        names.append(name)
-        columns.append(column or name)
-    found = recording.frequency_response(
-        recording.read_recording(record),
+    for key, text in (("--output", output), ("--input", input)):
+        own = signal_of(text, key)
+        names.append(own.name)
+        if text not in [each.name for each in signals]:
+            signals.append(own)
+    found = frequency_response(
+        read(record, signals),
         *names,
-        columns=cast("Any", columns),
-        estimator=cast("Any", estimator),
-        window=cast("Any", window),
+        estimator=estimator,
+        window=window,
         segment=segment,
         overlap=overlap,
     )
@@ -393,10 +400,11 @@ def frf(
 def ring(
     *,
     record: RecordName,
-    signal: str,
+    signal: Annotated[list[str], typer.Option("--signal", metavar="NAME=COLUMN", show_default=False)],
     start: Annotated[float | None, typer.Option("--from")] = None,
     stop: Annotated[float | None, typer.Option("--to")] = None,
     modes: Annotated[int, typer.Option(min=1)] = 1,
+    read: Any = record_of_options,
     show: Any = emit_record,
 ) -> None:
     """Frequencies and damping ratios of a decay.
@@ -404,11 +412,15 @@ def ring(
     Each has its confidence interval.
 
     Options:
-    signal: column of the record that decays
+    signal: column of the record that decays, as of frf: root_strain, root_strain=gauge*2e-6; and t=COLUMN
     start: time [s] at which the excitation ends
     stop: last time [s]
     modes: number of oscillations
     """
-    from tfarm.fitting import decays, recording
+    from tfarm.fitting import decays
+    from tfarm.fitting.signals import TIMES, signal_of
 
-    show(decays.fit_ringdown(recording.read_recording(record), signal, start=start, stop=stop, modes=modes))
+    signals = [signal_of(text) for text in signal]
+    names = [each.name for each in signals if each.name not in TIMES]
+    require(len(names) == 1, "--signal", names, "one signal decays, and the other one is t")
+    show(decays.fit_ringdown(read(record, signals), names[0], start=start, stop=stop, modes=modes))

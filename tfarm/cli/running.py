@@ -23,7 +23,7 @@ from tfarm.files import STANDARD_OUTPUT
 STREAMED = ("--csv", "--figure", "--png", "--mat", "--save")
 WRITTEN = (*STREAMED, "--animate")
 # such as 1_0
-PATHS = (*WRITTEN, "--out", "--tuned", "--dsp", "--law", "--controller", "--list", "--posterior")
+PATHS = (*WRITTEN, "--out", "--tuned", "--dsp", "--law", "--controller", "--list", "--posterior", "--run")
 # NAME=VALUE, one a name
 BY_NAME = ("--range", "--weight", "--over", "--start", "--bounds", "--prior", "--vary")
 # of the help, in its order

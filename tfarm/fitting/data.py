@@ -18,7 +18,8 @@ import hashlib
 import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
+from contextlib import suppress
 from importlib.util import find_spec
 from typing import Annotated, Any
 
@@ -259,8 +260,8 @@ class Sheet:
         require(not wrong[at], f"line {self.lines[at]}, {name}", float(self.columns[name][at]), remedy)
 
 
-def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
-    """Return the columns of a text file.
+def read_sheet(path: str | os.PathLike[str], key: str, wanted: Container[str] | None = None) -> Sheet:
+    """Return the columns of a text file, or the `wanted` ones: cells of the others may hold anything.
 
     Raises ParameterError naming the line for a missing or doubled name, a row of another length, or what is no finite
     number; naming `key` where the file cannot be read.
@@ -277,16 +278,16 @@ def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
         separator = next((each for each in "\t;" if each in rows[0][1]), ",")
         units = _header(list(map(_cell, rows[0][1].split(separator))))
         require(len(rows) > 1, "rows", 0, "a header and nothing below it")
-        values = _numbers(list(units), rows[1:], separator)
+        values = _numbers(list(units), rows[1:], separator, wanted)
     lines = tuple(number for number, _ in rows[1:])
-    return Sheet(dict(zip(units, values.T, strict=True)), units, lines, hashlib.sha256(data).hexdigest())
+    return Sheet(values, units, lines, hashlib.sha256(data).hexdigest())
 
 
 def _header(cells: Sequence[str]) -> dict[str, str]:
     """Return the unit of each column by its name; a first line of numbers is a missing header."""
     units: dict[str, str] = {}
     for place, cell in enumerate(cells, start=1):
-        name, unit = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell, re.DOTALL).groups("")  # type: ignore[union-attr]
+        name, unit = name_and_unit(cell)
         require(
             math.isnan(_number(name)),
             "header",
@@ -296,28 +297,49 @@ def _header(cells: Sequence[str]) -> dict[str, str]:
         require(
             name and name not in units, f"header, column {place}", name, "each column has a name of its own"
         )
-        units[name] = unit.strip()
+        units[name] = unit
     return units
+
+
+def name_and_unit(text: str) -> tuple[str, str]:
+    """Return the name of a column and its unit, "" where there is none: "t [s]"."""
+    name, unit = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", text, re.DOTALL).groups("")  # type: ignore[union-attr]
+    return name, unit.strip()
 
 
 def _cell(text: str) -> str:
     return text.strip().strip('"').strip()
 
 
-def _numbers(names: Sequence[str], rows: Sequence[tuple[int, str]], separator: str) -> Real:
-    """Return the cells (rows, columns) of numbered lines, by NumPy; the line of a row that is none is named."""
+def _numbers(
+    names: Sequence[str], rows: Sequence[tuple[int, str]], separator: str, wanted: Container[str] | None
+) -> dict[str, Real]:
+    """Return the wanted columns of numbered lines, by NumPy; the line of a cell that is no number is named."""
     for line, text in rows:
         if (count := text.count(separator) + 1) != len(names):
             raise ParameterError(
                 key=f"line {line}", value=text, remedy=f"{count} columns where the header names {len(names)}"
             )
+    chosen = [place for place, name in enumerate(names) if wanted is None or name in wanted]
+    if not chosen:
+        return {}
     lines = [text for _, text in rows]
-    values = np.loadtxt(lines, delimiter=separator, converters=_number, comments=None, ndmin=2)
+    # decimal commas
+    plain = lines if separator == "," else [text.replace(",", ".") for text in lines]
+    how: dict[str, Any] = {"delimiter": separator, "comments": None, "ndmin": 2, "usecols": chosen}
+    values = np.full((1, 1), math.nan)
+    # of quoted cells, and of what is no number
+    with suppress(ValueError):
+        values = np.loadtxt(plain, **how)
+    if not np.isfinite(values).all():
+        # ten times slower
+        values = np.loadtxt(lines, converters=_number, **how)
     for row, column in np.argwhere(np.isnan(values))[:1]:
         remedy = "no finite number; leave the row out, or write numbers as 50, 0.5 or 5e1"
-        cell = lines[row].split(separator)[column]
-        raise ParameterError(key=f"line {rows[row][0]}, {names[column]}", value=_cell(cell), remedy=remedy)
-    return values
+        place = chosen[column]
+        cell = lines[row].split(separator)[place]
+        raise ParameterError(key=f"line {rows[row][0]}, {names[place]}", value=_cell(cell), remedy=remedy)
+    return dict(zip((names[place] for place in chosen), values.T, strict=True))
 
 
 def _number(text: str) -> float:

@@ -113,6 +113,7 @@ def run_of(recording: Recording, arm: Arm, law: Law | None = None) -> Run:
         input=columns.get(driven),
         references=references if law is not None else {},
         law=law,
+        sigma=recording.sigma,
         source=recording.source,
         digest=recording.digest,
         note=recording.note,
