@@ -123,7 +123,7 @@ def test_a_run_that_is_none_is_one_line(text, tmp_path):
 def test_signals_of_runs_are_those_of_an_arm(tmp_path):
     path, _ = record(tmp_path)
     for signal, message in (
-        ("hub_angel=hub_angle", '--signal = \'hub_angel\': did you mean "hub_angle"?'),
+        ("hub_angel=hub_angle", "--signal = 'hub_angel': did you mean \"hub_angle\"?"),
         ("hub_angle", "input is missing: an open loop has its commanded input"),
         ("hub_torque~1", "record = "),
     ):

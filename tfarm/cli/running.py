@@ -23,9 +23,20 @@ from tfarm.files import STANDARD_OUTPUT
 STREAMED = ("--csv", "--figure", "--png", "--mat", "--save")
 WRITTEN = (*STREAMED, "--animate")
 # such as 1_0
-PATHS = (*WRITTEN, "--out", "--tuned", "--dsp", "--law", "--controller", "--list", "--posterior", "--run")
+PATHS = (
+    *WRITTEN,
+    "--out",
+    "--tuned",
+    "--dsp",
+    "--law",
+    "--controller",
+    "--list",
+    "--posterior",
+    "--run",
+    "--before",
+)
 # NAME=VALUE, one a name
-BY_NAME = ("--range", "--weight", "--over", "--start", "--bounds", "--prior", "--vary")
+BY_NAME = ("--range", "--weight", "--over", "--start", "--bounds", "--prior", "--vary", "--without", "--gain")
 # of the help, in its order
 CHAPTERS = ("Arm", "Loop", "Design", "Measure", "Study", "Report")
 

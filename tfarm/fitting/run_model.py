@@ -28,13 +28,14 @@ from tfarm.arm import AT_HUB, Arm
 from tfarm.arm.chain import Chain
 from tfarm.arrays import Real
 from tfarm.case import Case
+from tfarm.dsp import kernel
 from tfarm.dsp.discretise import acting_law
 from tfarm.dsp.plant import Plant
 from tfarm.dsp.pulse import PulseTransfer
 from tfarm.dsp.results import ideal_chain
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.sensed import sensed_plant
-from tfarm.dsp.simulate import LinearLoop, references_of
+from tfarm.dsp.simulate import LinearLoop, quantisers, references_of
 from tfarm.errors import require
 from tfarm.fitting.runs import Run
 from tfarm.records import frozen
@@ -58,6 +59,7 @@ class FitRun:
     `is_known` (outputs,) is whether a deviation was given, or is that of the residuals.  `gains` has the places of
     sensors' gains in the vector of what is searched for, `delay` that of the drive's dead time.  `own` is how many
     numbers it has of its own: with `is_moving` also the hub's drift and amplitudes of the lowest modes at the start.
+    One that `is_ideal` has no steps and limits of its chain.
     """
 
     run: Run
@@ -70,6 +72,7 @@ class FitRun:
     through_loop: bool = False
     gains: tuple[tuple[str, int], ...] = ()
     delay: int | None = None
+    is_ideal: bool = True
 
     @property
     def size(self) -> int:
@@ -127,25 +130,42 @@ class FitRun:
 
     def respond(self, arm: Arm, value: Callable[[int], float]) -> RunResponse:
         """Return the outputs of an arm; `value` gives the number of a place in what is searched for."""
-        run = self.run
-        steady = np.ones(run.count)
         pulse = self.pulse(arm, value)
-        rows = [pulse.plant.outputs.index(name) for name in run.names]
-        if run.law is None:
-            assert run.input is not None
-            found = pulse.held_response(run.input)
-            columns = [pulse.held_response(steady), *self._free(pulse, rows)]
-        else:
-            loop = self.loop(arm, value)
-            zero = 0 * steady
-            found = pulse.held_response(loop.input(loop.wanted, zero))
-            at_once = PulseTransfer(pulse.plant, replace(pulse.sampling, delay_samples=0.0))
-            answer = pulse.held_response(loop.input(0 * loop.wanted, steady))
-            columns = [at_once.held_response(steady) + answer]
-            for on_signals in self._free(pulse, rows):
-                answer = pulse.held_response(loop.input(-loop.read(on_signals), zero))
-                columns.append(on_signals + answer)
+        loop = None if self.run.law is None else self.loop(arm, value)
+        rows = self.rows(pulse)
+        found = pulse.held_response(self.commands(loop))
+        columns = [self.on_torque(pulse, loop, np.ones(self.run.count))]
+        for on_signals in self._free(pulse, rows):
+            if loop is not None:
+                on_hub = np.zeros(self.run.count)
+                on_signals = on_signals + pulse.held_response(loop.input(-loop.read(on_signals), on_hub))
+            columns.append(on_signals)
         return RunResponse(found[rows], np.array(columns)[:, rows])
+
+    def rows(self, pulse: PulseTransfer) -> list[int]:
+        """Return the places of the run's signals among those of its plant."""
+        return [pulse.plant.outputs.index(name) for name in self.run.names]
+
+    def commands(self, loop: RunLoop | None, offsets: Real | None = None) -> Real:
+        """Return the input (n,): that of the record, or of its controller, whose sensors have offsets (outputs,)."""
+        run = self.run
+        if loop is None:
+            assert run.input is not None
+            return run.input if self.is_ideal else converted(run.input, quantisers(self.chain)[kernel.DAC])
+        wanted = loop.wanted
+        if offsets is not None:
+            names = loop.linear.plant.outputs
+            off = np.zeros((len(names), run.count))
+            off[[names.index(name) for name in run.names]] = offsets[:, None]
+            wanted = wanted - loop.read(off)
+        return loop.input(wanted, np.zeros(run.count))
+
+    def on_torque(self, pulse: PulseTransfer, loop: RunLoop | None, torque: Real) -> Real:
+        """Return the signals (all of the plant, n) of a torque (n,) on the hub, and of a controller's answer to it."""
+        if loop is None:
+            return pulse.held_response(torque)
+        at_once = PulseTransfer(pulse.plant, replace(pulse.sampling, delay_samples=0.0))
+        return at_once.held_response(torque) + pulse.held_response(loop.input(0 * loop.wanted, torque))
 
     def pulse(self, arm: Arm, value: Callable[[int], float]) -> PulseTransfer:
         """Return the plant of the run's signals at the samples of its record, times the gains of sensors.
@@ -170,7 +190,7 @@ class FitRun:
 
     def _chain(self, value: Callable[[int], float]) -> Chain:
         """Return the chain without steps and limits, of an open loop at the record's period, with the dead time."""
-        chain = ideal_chain(self.chain)
+        chain = ideal_chain(self.chain) if self.is_ideal else self.chain
         if self.run.law is None:
             chain = at_period(chain, self.run.period)
         if self.delay is None:
@@ -253,7 +273,7 @@ class FitRun:
         """Return (1 + L) of deviations (rows, outputs, n): what the noise of sensors was before it went round."""
         pulse = self.pulse(arm, value)
         loop = self.loop(arm, value)
-        rows = [pulse.plant.outputs.index(name) for name in self.run.names]
+        rows = self.rows(pulse)
         found = []
         for part in parts:
             read = np.zeros((len(pulse.plant.outputs), self.run.count))
@@ -325,6 +345,14 @@ def fit_run(arm: Arm, run: Run, chain: Chain) -> FitRun:
     # raises for a period that is no part of the controller's
     assert found.ratio
     return replace(found, own=len(found.own_names(arm)))
+
+
+def converted(values: Real, row: Real) -> Real:
+    """Return values on the steps and in the range of a converter, a row of `quantisers`."""
+    step, low, high = row
+    if step:
+        values = np.rint(values / step) * step
+    return np.clip(values, low, high)
 
 
 def at_period(chain: Chain, period: float) -> Chain:
