@@ -1,6 +1,7 @@
 """Records from files: the same in every format, with units and scales; timing, decimation; one line for bad ones."""
 
 import hashlib
+import json
 import sys
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.signal import cont2discrete, dlsim, tf2ss
 
 from tests.fitting.uff import data_set
 from tests.shared import refusal
-from tests.shell import answer, refused
+from tests.shell import answer, refused, run
 from tfarm.fitting.recording import Recording, decimated, load_run, read_recording
 
 T = 0.002 * np.arange(50) + 1.0
@@ -116,6 +117,9 @@ CONVERTED = {
     ("x [mV]", "strain@0.05=x[1]*2e-3"): 2e-3,
     ("x [V]", "root_moment=x*0.5"): 0.5,
     ("x [g]", "tip_acceleration=x"): 9.80665,
+    ("x (deg)", "hub_angle=x (deg)"): np.pi / 180,
+    ("x (deg) [rad]", "hub_angle=x (deg)"): 1.0,
+    ("x (left)", "hub_angle=x (left)"): 1.0,
     ("x [m/s2]", "tip_acceleration=x"): 1.0,
     ("x [m/s²]", "tip_acceleration=x"): 1.0,
     ("x [µm]", "tip_deflection=x"): 1e-6,
@@ -339,7 +343,7 @@ def test_a_decimation_that_would_be_wrong_is_refused():
     record = recorded(1e-3, hub_torque=u, hub_angle=u)
     for by, held, message in (
         (4, "hub_torque", "decimate = 4: hub_torque changes within 4 samples: a filtered input is held no longer"),
-        (4, "motor_current", "decimate = 'motor_current': known are: hub_torque, hub_angle"),
+        (4, "motor_current", "decimate = 4: needs motor_current, by which the samples"),
         (8, "", "decimate = 8: leaves 0 of 400 samples; at least 8"),
         (0, "", "decimate = 0: a whole number"),
     ):
@@ -364,8 +368,11 @@ def test_commands_read_signals_and_decimate(tmp_path, capsys):
     ring = np.exp(-0.6 * t) * np.cos(2 * np.pi * 5 * t)
     u = np.random.default_rng(2).standard_normal(t.size)
     path = written(tmp_path / "a.csv", ("ms", "tip [deg]", "u", "acc [g]"), 1e3 * t, ring, u, 2 * u)
-    found = answer(capsys, "ring", str(path), "--signal", "tip", "--signal", "t=ms[ms]", "--decimate", "10")
-    (mode,) = found["modes"]
+    signals = ("--signal", "tip", "--signal", "t=ms[ms]")
+    code, out, err = run(capsys, "ring", str(path), *signals, "--decimate", "10", "--json")
+    (mode,) = json.loads(out)["modes"]
+    assert (code, err.count("\n")) == (0, 1)
+    assert err.startswith("tfarm: one sample of 10, after a symmetric FIR filter of 501 taps")
     assert mode["frequency_hz"] == pytest.approx(5.0, rel=1e-6)
     # of what is left of it at the first sample that the filter has neighbours for, 0.25 s
     assert mode["amplitude"] == pytest.approx(np.pi / 180 * np.exp(-0.6 * 0.25), rel=1e-4)

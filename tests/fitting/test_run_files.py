@@ -8,7 +8,7 @@ import tfarm
 from tests.fitting.test_recording import written
 from tests.shared import refusal
 from tfarm.cli.options import runs_of_options
-from tfarm.fitting.run_files import runs_of
+from tfarm.fitting.run_files import runs_of, unexplained
 
 LAB = tfarm.load("sasaki2012-lab")
 T, N = 0.01, 1500
@@ -68,6 +68,15 @@ def test_the_law_that_was_running_explains_its_input_and_no_other_does(how, tmp_
     assert "% of" in str(refusal(runs_of, [f"{path}={law(tmp_path)}"], LAB, in_degrees))
     # of which the record shows less
     assert runs_of([wrong], LAB, ["hub_angle=root_moment*1", "hub_torque"])[0].references == {}
+
+
+def test_a_law_is_left_nothing_of_its_own_input_whatever_its_first_state():
+    """A slow pole whose first state is all but the whole input, by SciPy's filter, two samples late: to rounding."""
+    y = np.random.default_rng(5).standard_normal(400)
+    u, _ = lfilter([0.5, -0.2], [1.0, -0.99], y, zi=[80.0])
+    slow = tfarm.Law({"hub_angle": ([0.5, -0.2], [1.0, -0.99])}, period=T)
+    assert unexplained(slow, y[None], np.r_[7.0, 3.0, -u[:-2]] + 4.0) == pytest.approx(0.0, abs=1e-12)
+    assert unexplained(slow, -y[None], np.r_[7.0, 3.0, -u[:-2]] + 4.0) > 0.05
 
 
 @pytest.mark.parametrize("share", [1.0, 3.0, 1.0005, 0.5, 1.5])

@@ -443,8 +443,6 @@ def frf(
         overlap=overlap,
     )
     emit(found, csv=csv, rows=True, show=show)
-    if found.note:
-        print_line(found.note)
 
 
 @measuring_command(epilog="ring record.csv --signal root_strain --from 2.5")

@@ -335,7 +335,10 @@ def record_of_options(
     remedy = "a standard deviation is for runs; leave it out"
     for each in signals:
         require(each.sigma is None, each.key, f"~{each.sigma}", remedy)
-    return decimated(read_recording(path, signals), decimate)
+    found = decimated(read_recording(path, signals), decimate)
+    if found.note:
+        print_line(found.note)
+    return found
 
 
 def runs_of_options(

@@ -201,7 +201,9 @@ def decimated(recording: Recording, by: int, held: str = "") -> Recording:
         return recording
     rate = 1 / recording.period
     if held:
-        first = held_phase(recording.signal(held, "decimate"), by)
+        remedy = f"needs {held}, by which the samples of the slow loop are known; use every sample"
+        require(held in recording.signals, "decimate", by, remedy, recording.source)
+        first = held_phase(recording.signals[held], by)
         remedy = (
             f"{held} changes within {by} samples: a filtered input is held no longer, and the model of the rig is "
             "that of a held one; use every sample, or cut the record"

@@ -75,7 +75,7 @@ def check_period(law: Law, period: float, file: str) -> None:
     # of the period of a record
     away = 1e-3
     ratio = 1.0 if law.period is None else law.period / period
-    is_multiple = abs(ratio - max(1, round(ratio))) <= away * ratio
+    is_multiple = abs(ratio - round(ratio)) <= away * ratio
     remedy = (
         f"is sampled every {period:.6g} s, and the law of {file} every {law.period} s: the law's period is that of the "
         "record, or a whole multiple of it"

@@ -1,6 +1,7 @@
 """Signals in the columns of a record: names, units and scales.
 
-The unit of a column is in brackets after its name, "enc [deg]", in an attribute of its file, or in an option:
+The unit of a column is in brackets after its name, "enc [deg]", in an attribute of its file, or in an option; a name
+that ends in a known unit in parentheses, "enc (deg)", has that one.
 
     hub_angle                     the column of that name
     hub_angle=enc                 another one, in the unit that the file has for it, without one in SI units
@@ -104,18 +105,20 @@ class RecordSignal:
         Raises ParameterError for an unknown unit, for one of another quantity, for a scale of a column whose unit is
         not the SI one, where either may be meant, and for an angle beyond 100 rad of a column without a unit.
         """
-        written = self.unit or own
+        found = re.search(r"\(([^()]+)\)$", self.column)
+        named = found[1] if found and known_unit(found[1]) else ""
+        written = self.unit or own or named
         key = f"unit of {self.column}"
         wanted = si_unit(self.name)
-        found = known_unit(written)
+        of = known_unit(written)
         if self.scale is not None and not self.unit:
             # of counts, volts, or nothing
-            is_plain = found is None or found[1] == 1.0
+            is_plain = of is None or of[1] == 1.0
             remedy = (
-                f"write {self.column}[{own}]*{self.scale:g} for SI values times the scale, or "
+                f"write {self.column}[{written}]*{self.scale:g} for SI values times the scale, or "
                 f"{self.column}[1]*{self.scale:g} for the numbers of the file times it"
             )
-            require(is_plain, key, own, remedy)
+            require(is_plain, key, written, remedy)
             return values * self.scale
         if not written:
             largest = float(abs(values).max(initial=0.0))
@@ -125,8 +128,8 @@ class RecordSignal:
             require(wanted != "rad" or largest <= MOST_ANGLE, key, MISSING, remedy)
             return values
         another = f"or give a scale: {self.name}={self.column}*NUMBER"
-        require(found, key, written, f"{KNOWN_UNITS}; {another}")
-        unit, size = found  # type: ignore[misc]
+        require(of, key, written, f"{KNOWN_UNITS}; {another}")
+        unit, size = of  # type: ignore[misc]
         is_same = self.scale is not None or wanted in ("", unit)
         require(is_same, key, written, f"{self.name} is in {wanted}; {another}")
         return values * (size * (self.scale or 1.0))
