@@ -31,3 +31,29 @@ from tfarm.fitting.overlay import overlay as overlay
 from tfarm.fitting.prediction import predict as predict
 from tfarm.fitting.recording import read_recording as read_recording
 from tfarm.fitting.run_files import runs_of as runs_of
+from tfarm.loop.locus import locus as locus
+from tfarm.loop.margins import margins as margins
+from tfarm.loop.norms import norm as norm
+from tfarm.loop.nyquist import nyquist as nyquist
+from tfarm.loop.plane import gain_map
+from tfarm.loop.poles import closed_loop_poles as closed_loop_poles
+from tfarm.loop.sampled_analysis import sampled as sampled
+from tfarm.loop.spillover import spill as spill
+from tfarm.reduced import reduce as reduce
+from tfarm.references import reference as reference
+from tfarm.report.live import explore as explore
+from tfarm.response import bode as bode
+from tfarm.response import transfer as transfer
+from tfarm.spectrum import damped_modes as damped_modes
+from tfarm.spectrum import modes as modes
+from tfarm.spectrum.gains import default_gains as default_gains
+from tfarm.studies.study import study as study
+from tfarm.synthesis.design import design as design
+from tfarm.synthesis.design import trade_off as trade_off
+from tfarm.tuner import tune as tune
+
+Case = CaseFace
+map = gain_map
+
+__version__: str
+__all__: list[str]
