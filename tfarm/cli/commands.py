@@ -345,12 +345,12 @@ def fit(
         raise typer.Exit(3)
 
 
-@measuring_command(epilog="predict fitted.toml --run run.csv=law.toml --posterior fitted.posterior.json")
+@measuring_command(epilog="predict rig.toml --run record.csv=law.toml --posterior rig.posterior.json")
 def predict(
     *,
     arm: ArmName,
     runs: Any = runs_of_options,
-    posterior: Annotated[Path | None, typer.Option(metavar="FILE", exists=True)] = None,
+    posterior: File = None,
     before: Annotated[str | None, typer.Option(metavar="ARM")] = None,
     without: Annotated[
         list[Any] | None, typer.Option(metavar="KEY=VALUE", parser=name_and(numbers("KEY=NUMBER", 1)))

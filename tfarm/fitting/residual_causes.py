@@ -18,7 +18,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Annotated, NamedTuple
 
@@ -30,6 +30,7 @@ from tfarm.arrays import Real
 from tfarm.digits import general
 from tfarm.fitting.decays import NOT_WHITE
 from tfarm.fitting.run_model import FitRun, chance_of_white
+from tfarm.records import frozen
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Percent, Quantity
 
@@ -89,7 +90,7 @@ class ResidualCause(NamedTuple):
         return f"{self.change} ({self.size})"
 
 
-@dataclass(frozen=True)
+@frozen
 class Residual:
     """Measured less predicted `left` (outputs, n), how the arm was computed, and `sigma` (outputs,) of the noise.
 
