@@ -23,9 +23,31 @@ from tfarm.files import STANDARD_OUTPUT
 STREAMED = ("--csv", "--figure", "--png", "--mat", "--save")
 WRITTEN = (*STREAMED, "--animate", "--c")
 # such as 1_0
-PATHS = (*WRITTEN, "--out", "--tuned", "--dsp", "--law", "--controller", "--list", "--posterior", "--run")
+PATHS = (
+    *WRITTEN,
+    "--out",
+    "--tuned",
+    "--dsp",
+    "--law",
+    "--controller",
+    "--list",
+    "--posterior",
+    "--run",
+    "--before",
+)
 # NAME=VALUE, one a name
-BY_NAME = ("--range", "--weight", "--over", "--start", "--bounds", "--prior", "--vary", "--noise")
+BY_NAME = (
+    "--range",
+    "--weight",
+    "--over",
+    "--start",
+    "--bounds",
+    "--prior",
+    "--vary",
+    "--noise",
+    "--without",
+    "--gain",
+)
 # of the help, in its order
 CHAPTERS = ("Arm", "Loop", "Design", "Measure", "Study", "Report")
 
