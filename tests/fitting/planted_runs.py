@@ -13,7 +13,8 @@ Two to five numbers are free, each started up to 30 % off.  No fit may end above
 the truth, nominal 95 % intervals are counted, and so are right models that are rejected; wrong ones have to be.
 
 Derivatives of the noiseless records by the elements themselves give the shift of the numbers by shorter elements, in
-standard deviations ("bias"), and chi-squared of a wrong model in excess of its freedom ("excess").
+standard deviations ("bias"), and chi-squared of a wrong model in excess of its freedom ("excess"), as far as both are
+linear: numbers that may go farther explain more of a wrong model's record.
 """
 
 import json
