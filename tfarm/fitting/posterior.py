@@ -74,7 +74,11 @@ class Posterior(StrictTable):
     @property
     def with_all_determined(self) -> Posterior:
         """The posterior with a deviation of `OPEN_DEVIATION` where the data say nothing."""
-        whole = self.matrix + OPEN_DEVIATION**2 * (np.eye(len(self.numbers)) - self.information @ self.matrix)
+        # by its axes: the identity less information times covariance is rounded by more than the least variance
+        sizes, axes = np.linalg.eigh(self.matrix)
+        is_open = sizes <= NO_VARIANCE * abs(sizes).max(initial=0.0)
+        unknown = axes[:, is_open]
+        whole = self.matrix + OPEN_DEVIATION**2 * unknown @ unknown.T
         return self.model_copy(update={"covariance": whole.tolist(), "not_determined": []})
 
     def must_be_determined(self, ranged: Sequence[str]) -> None:
