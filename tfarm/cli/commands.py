@@ -301,7 +301,7 @@ def fit(
     theory: TheoryName = None,
     show: Any = emit_record,
 ) -> None:
-    """Fit of an arm's numbers to measured responses, runs over time and ring-downs.
+    """Fit of an arm's numbers to responses, runs and ring-downs.
 
     Each number has its confidence interval.  The runs are those of the exact sampled plant, through the chain of the
     arm's file or of --dsp.
