@@ -12,7 +12,8 @@ from scipy.signal import cont2discrete, dlsim, tf2ss
 from tests.fitting.uff import data_set
 from tests.shared import refusal
 from tests.shell import answer, refused, run
-from tfarm.fitting.recording import Recording, decimated, load_run, read_recording
+from tfarm.fitting.recording import Recording, decimated, read_recording
+from tfarm.fitting.run_files import load_run
 
 T = 0.002 * np.arange(50) + 1.0
 X, Y = np.sin(T), np.cos(T)
@@ -353,13 +354,14 @@ def test_a_decimation_that_would_be_wrong_is_refused():
 def test_a_measured_run_of_a_law_file_names_its_columns(tmp_path):
     written(tmp_path / "a.csv", ("t", "ref [deg]", "enc"), T, X, Y)
     (tmp_path / "law.toml").write_text(
-        '[measured]\nfile = "a.csv"\nsignals = ["reference:hub_angle=ref", "hub_angle=enc*-0.5"]\n'
+        '[law.hub_rate]\ngain = 1.0\n[measured]\nfile = "a.csv"\nsignals = ["reference:hub_angle=ref", "hub_angle=enc*-0.5"]\n'
     )
-    found = load_run(tmp_path / "law.toml")
+    found = load_run(tmp_path / "law.toml").run
     assert found.t == pytest.approx(T - 1.0, abs=1e-15)
-    assert found.reference == pytest.approx(np.radians(X), rel=1e-15)
-    assert found.hub_angle.tolist() == (-0.5 * Y).tolist()
-    assert not found.root_moment.size
+    assert found.references["hub_angle"] == pytest.approx(np.radians(X), rel=1e-15)
+    assert found.outputs["hub_angle"].tolist() == (-0.5 * Y).tolist()
+    assert found.names == ("hub_angle",)
+    assert found.law.signals == ("hub_rate",)
 
 
 def test_commands_read_signals_and_decimate(tmp_path, capsys):

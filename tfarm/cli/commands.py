@@ -25,6 +25,7 @@ from tfarm.cli.options import (
     name_and,
     numbers,
     outputs_on,
+    read_arm,
     record_of_options,
     refuse,
     runs_of_options,
@@ -353,6 +354,55 @@ def fit(
     emit(found, png=png, also=(save, page), show=show)
     if not found.converged or found.misses:
         raise typer.Exit(3)
+
+
+@measuring_command(epilog="predict rig.toml --run record.csv=law.toml --posterior rig.posterior.json")
+def predict(
+    *,
+    arm: ArmName,
+    runs: Any = runs_of_options,
+    posterior: File = None,
+    before: Annotated[str | None, typer.Option(metavar="ARM")] = None,
+    without: Annotated[
+        list[Any] | None, typer.Option(metavar="KEY=VALUE", parser=name_and(numbers("KEY=NUMBER", 1)))
+    ] = None,
+    gain: Annotated[
+        list[Any] | None, typer.Option(metavar="SIGNAL=VALUE", parser=name_and(numbers("SIGNAL=NUMBER", 1)))
+    ] = None,
+    draws: Annotated[int, typer.Option(min=2, max=1000)] = 20,
+    theory: TheoryName = None,
+    chain: Any = chain_of_options,
+    show: Any = emit,
+) -> None:
+    """Prediction of a run that no fit has used, with null models.
+
+    A prediction counts for a signal where it beats them all.
+
+    Options:
+    posterior: of the fit, for the band of the prediction
+    before: preset or file of the arm before the fit, a null model
+    without: number of the fit as it is without it, a null model; such as drive.gain=1 or drive.delay=0
+    gain: gain of a sensor, as a fit has it: root_moment=1.02
+    draws: number of arms drawn from the posterior
+    """
+    from tfarm.fitting.posterior import load_posterior
+
+    subject = load_arm(arm, theory)
+    found = runs(subject)
+    require(len(found) == 1, "--run", len(found), "give one run, which no fit has used")
+    earlier = None if before is None else read_arm(before)
+    answer = tfarm.predict(
+        subject,
+        found[0],
+        chain(arm),
+        before=None if earlier is None else load_arm(earlier, theory),
+        before_chain=None if earlier is None else chain(earlier),
+        posterior=None if posterior is None else load_posterior(posterior),
+        without={key: value for key, (value,) in without or []},
+        gains={key: value for key, (value,) in gain or []},
+        draws=draws,
+    )
+    show(answer)
 
 
 @measuring_command(

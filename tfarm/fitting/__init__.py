@@ -7,6 +7,9 @@
 `ratio`: the exact response of one signal over another.
 `runs`: records of a rig in motion, in open or closed loop.
 `run_model`: a run as the exact sampled plant has it, and what it leaves.
+`prediction`: a run that no fit has used, predicted, with null models.
+`null_models`: an arm as a run is predicted with, and models that have to be worse.
+`residual_causes`: what a prediction leaves, and the single changes that would remove it.
 `overlay`: a measured response compared with the exact one, mode by mode.
 `model`: free numbers of an arm, and the residuals that they leave.
 `solve`: the search for the least sum of squares.

@@ -13,16 +13,10 @@ from tfarm.fitting.data import MOST_RECORD_BYTES, Sheet, name_and_unit, read_she
 from tfarm.foreign import read_arrays
 
 # by the end of a file's name: kind of its reader in `tfarm.foreign`, its package and the extra that has it
-HDF5 = ("hdf5", "h5py", "hdf5")
-UFF = ("uff-time", "pyuff", "uff")
 READERS = {
-    ".h5": HDF5,
-    ".hdf5": HDF5,
-    ".hdf": HDF5,
+    **dict.fromkeys((".h5", ".hdf5", ".hdf"), ("hdf5", "h5py", "hdf5")),
+    **dict.fromkeys((".uff", ".unv", ".uf"), ("uff-time", "pyuff", "uff")),
     ".parquet": ("columns", "pyarrow", "study"),
-    ".uff": UFF,
-    ".unv": UFF,
-    ".uf": UFF,
 }
 
 

@@ -1,35 +1,15 @@
 """Records over time: a column of times and named signals, from CSV, .mat, HDF5, Parquet or UFF files.
 
 Nothing is resampled: what is unevenly sampled is refused, or noted where it is less than 10 % of a period.
-
-A run measured on a rig under a controller is compared with the exact sampled loop: [measured] of a law's file.
-
-    [measured]
-    file = "step.csv"                    # in the folder of the law's file
-    source = "laboratory X, run 7"       # shown with it
-    signals = ["hub_angle=enc[deg]"]     # its columns, if they have other names or units
-
-The record has a column `t` [s], one `reference:hub_angle` [rad], the reference of the
-controller, and one for each of `hub_angle` [rad] and `root_moment` [N m] that was measured.
 """
 
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
-from pathlib import Path
 
 import numpy as np
-from pydantic import Field
 
-from tfarm.arm.chain import TIME_ROUNDING
-from tfarm.arm.reading import AnyFile, load_tables
-from tfarm.arm.schema import StrictTable, validate_table
 from tfarm.arrays import Real
-from tfarm.case import Case
-from tfarm.dsp.results import simulate_modes
-from tfarm.dsp.scenarios import Scenario
-from tfarm.dsp.simulate import Simulator
-from tfarm.dsp.simulation import Simulation
 from tfarm.errors import MISSING, ParameterError, did_you_mean, list_within, name_file, require
 from tfarm.fitting.columns import read_columns
 from tfarm.fitting.signals import TIMES, RecordSignal, known_unit, si_unit, signal_of
@@ -266,112 +246,3 @@ def held_phase(values: Real, by: int) -> int | None:
     if not changes.size:
         return 0
     return int(changes[0]) if (changes == changes[0]).all() else None
-
-
-class RunTable(StrictTable):
-    """[measured]."""
-
-    file: str
-    source: str = ""
-    signals: list[str] = Field(default_factory=list)
-
-
-@frozen
-class MeasuredRun:
-    """A measured run: `t` (n,) [s] from 0 on, the `reference` (n,) [rad] of the hub's angle, and what was read.
-
-    `hub_angle` (n,) [rad] and `root_moment` (n,) [N m] are empty where they were not measured.
-    """
-
-    t: Real
-    reference: Real
-    hub_angle: Real
-    root_moment: Real
-    source: str = ""
-
-    def scenario(self, period: float) -> Scenario:
-        """Return the same task at samples: from rest at the first reference, with the reference relative to that.
-
-        The reference is interpolated linearly between its rows.
-        """
-        t = period * np.arange(int(self.t[-1] / period * (1 + TIME_ROUNDING)) + 1)
-        reference = np.interp(t, self.t, self.reference) - self.reference[0]
-        none = np.zeros(t.size)
-        until = self.t[self.reference != self.reference[-1]].max(initial=0.0)
-        return Scenario("measured", period, none, reference, none, none, none, busy_until=float(until))
-
-    @property
-    def step(self) -> float:
-        """The change [rad] of the reference from first to last."""
-        return float(self.reference[-1] - self.reference[0])
-
-
-@frozen
-class RunComparison:
-    """A measured run and that of the exact sampled loop under the same reference; `run` is relative to the start."""
-
-    measured: MeasuredRun
-    run: Simulation
-
-    @property
-    def hub_angle(self) -> Real:
-        """The computed hub angle [rad] at the samples, from the first reference on."""
-        return self.run.at_samples.hub_angle + self.measured.reference[0]
-
-
-def compare_run(case: Case, measured: MeasuredRun) -> RunComparison:
-    """Return the sampled loop under the reference of a measured run, with as many modes as its signals take.
-
-    Raises ParameterError as `simulate` does.
-    """
-    run, _ = simulate_modes(case, measured.scenario(case.chain.sampling.period))
-    return RunComparison(measured, run)
-
-
-def departures(
-    case: Case, measured: MeasuredRun, count: int, longer: float, share: float = 0.05
-) -> list[float]:
-    """Return the times [s] after a measured run at which the computed hub angle is off its end, by a share of the step.
-
-    The reference stays for that much `longer` [s], of 10,000 samples at most; `count` modes are in the loop.
-    """
-    period = case.chain.sampling.period
-    end = float(measured.t[-1])
-    t = np.append(measured.t, end + min(longer, 10_000 * period))
-    held = replace(measured, t=t, reference=np.append(measured.reference, measured.reference[-1]))
-    run = Simulator(case, held.scenario(period), count=count).run().at_samples
-    settled = run.hub_angle[run.t <= end][-1]
-    away = abs(run.hub_angle - settled) > share * abs(measured.step)
-    return run.t[away & (run.t > end)].tolist()
-
-
-def overshoot(angle: Real, step: float, end: float) -> float:
-    """Return the overshoot of an angle [rad] beyond the `end` of a step [rad], as a share of it.
-
-    Below 0 where it has none.
-    """
-    if step:
-        return float(np.max((angle - end) * np.sign(step)) / abs(step))
-    return 0.0
-
-
-def load_run(name_or_path: AnyFile) -> MeasuredRun | None:
-    """Return the run of a file's [measured] table, None where it has none.
-
-    Raises ParameterError for an unknown key, and for a record without these signals or that is none, naming the file.
-    """
-    tables, file = load_tables(name_or_path)
-    if "measured" not in tables:
-        return None
-    with name_file(file):
-        table = validate_table(RunTable, tables["measured"], "measured")
-        found = read_recording(Path(file).parent / table.file, table.signals)
-        reference = found.signal("reference:hub_angle", "measured.file")
-        require(
-            {"hub_angle", "root_moment"} & found.signals.keys(),
-            "measured.file",
-            table.file,
-            "has neither hub_angle [rad] nor root_moment [N m] with reference:hub_angle [rad]",
-        )
-    angle, moment = (found.signals.get(name, np.empty(0)) for name in ("hub_angle", "root_moment"))
-    return MeasuredRun(found.times - found.start, reference, angle, moment, table.source)

@@ -3,21 +3,39 @@
 Where a record has the input and every signal of its law, the law has to explain the input: the law in z is driven by
 the recorded signals, and its output is compared with the recorded input, up to the first state of the law, a constant
 and a delay of up to two samples, all of which the record does not have.
+
+A law's file names the run that was measured under it, and what is known of the arm from other runs:
+
+    [measured]
+    file = "step.csv"                    # in the folder of the law's file, as the others
+    source = "laboratory X, run 7"       # shown with it
+    signals = ["hub_angle=enc[deg]"]     # its columns, if they have other names or units
+    posterior = "rig.posterior.json"     # of the fit, for the band of the prediction
+    before = "drawing.toml"              # the arm before the fit, a null model
+
+The record has a column `t` [s], one `reference:hub_angle` [rad], the reference of the controller, and one for each of
+`hub_angle` [rad] and `root_moment` [N m] that was measured.
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
+from pydantic import Field
 
-from tfarm.arm import Arm, Law
+from tfarm.arm import Arm, Law, load
 from tfarm.arm.law import REFERENCE
 from tfarm.arm.law_tables import load_law
+from tfarm.arm.reading import AnyFile, load_tables
+from tfarm.arm.schema import StrictTable, validate_table
 from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.dsp.discretise import discretise_law
 from tfarm.errors import MISSING, name_file, require
+from tfarm.fitting.posterior import Posterior, load_posterior
 from tfarm.fitting.recording import decimated, read_recording
 from tfarm.fitting.runs import Run, run_of
 from tfarm.fitting.signals import RecordSignal, signal_of
+from tfarm.records import frozen
 
 
 def runs_of(texts: Sequence[str], arm: Arm, signals: Sequence[str] = (), decimate: int = 1) -> list[Run]:
@@ -88,7 +106,8 @@ def check_law(law: Law, run: Run, file: str) -> None:
     share = unexplained(own, driving, run.input[first])
     remedy = (
         f"driven by the record's {', '.join(own.signals)} it leaves {100 * share:.3g} % of its input unexplained, "
-        f"of {100 * most:g} % at most: another law was running, or a sign or unit of a column is wrong"
+        f"of {100 * most:g} % at most: another law was running, a sign or unit of a column is wrong, or "
+        "the law reads other signals than these: then leave the input out with --signal"
     )
     require(share <= most, "law", file, remedy)
 
@@ -122,3 +141,54 @@ def unexplained(law: Law, columns: Real, recorded: Real) -> float:
         size = max(float(np.linalg.norm(now - now.mean())), LEAST_SIZE)
         shares.append(float(np.linalg.norm(left)) / size)
     return min(shares)
+
+
+class RunTable(StrictTable):
+    """[measured]."""
+
+    file: str
+    source: str = ""
+    signals: list[str] = Field(default_factory=list)
+    posterior: str = ""
+    before: str = ""
+
+
+@frozen
+class MeasuredRun:
+    """A run measured under the law of a file, and what is known of the arm: a posterior, the arm before a fit."""
+
+    run: Run
+    posterior: Posterior | None = None
+    before: Arm | None = None
+
+
+def load_run(name_or_path: AnyFile) -> MeasuredRun | None:
+    """Return the run of a file's [measured] table under the law of that file, None where it has none.
+
+    Raises ParameterError for an unknown key, and for a record without these signals or that is none, naming the file.
+    """
+    tables, file = load_tables(name_or_path)
+    if "measured" not in tables:
+        return None
+    folder = Path(file).parent
+    with name_file(file):
+        table = validate_table(RunTable, tables["measured"], "measured")
+        found = read_recording(folder / table.file, table.signals)
+        reference = found.signal("reference:hub_angle", "measured.file")
+        outputs: dict[str, Real] = {
+            name: found.signals[name] for name in ("hub_angle", "root_moment") if name in found.signals
+        }
+        remedy = "has neither hub_angle [rad] nor root_moment [N m] with reference:hub_angle [rad]"
+        require(outputs, "measured.file", table.file, remedy)
+        run = Run(
+            period=found.period,
+            outputs=outputs,
+            references={"hub_angle": reference},
+            law=load_law(name_or_path),
+            source=table.source or table.file,
+            digest=found.digest,
+            note=found.note,
+        )
+    posterior = load_posterior(folder / table.posterior) if table.posterior else None
+    before = load(folder / table.before) if table.before else None
+    return MeasuredRun(run, posterior, before)

@@ -90,6 +90,32 @@ class Run:
         """The measured signals."""
         return tuple(self.outputs)
 
+    @property
+    def is_led(self) -> bool:
+        """Whether a controller leads the hub's angle, which was measured, to a reference."""
+        return self.law is not None and "hub_angle" in self.references and "hub_angle" in self.outputs
+
+    @property
+    def driving(self) -> Real:
+        """What moves the arm (columns, n): the input of an open loop, or the references of a closed one."""
+        if self.law is None or not self.references:
+            return np.array([self.input])
+        return np.array([*self.references.values()])
+
+    @property
+    def driving_changes(self) -> Real:
+        """The same, of references the change from sample to sample: of a step nearly white."""
+        found = self.driving
+        if self.law is None or not self.references:
+            return found
+        return np.diff(found, axis=1, prepend=0.0)
+
+    @property
+    def busy_until(self) -> float:
+        """The time [s] of the last change of that."""
+        changes = (np.diff(self.driving, axis=1) != 0).any(axis=0)
+        return float(self.period * (1 + np.flatnonzero(changes).max(initial=-1)))
+
 
 def run_of(recording: Recording, arm: Arm, law: Law | None = None) -> Run:
     """Return the run that a record has of an arm: its columns by their names.
@@ -121,6 +147,19 @@ def run_of(recording: Recording, arm: Arm, law: Law | None = None) -> Run:
         digest=recording.digest,
         note=recording.note,
     )
+
+
+def from_rest(run: Run) -> tuple[Run, float]:
+    """Return a run in closed loop about its first hub angle, and that angle [rad], where it has a reference of it.
+
+    So the arm is at rest at 0 there, and so is the controller; a constant angle changes nothing else in a linear loop.
+    """
+    if not run.is_led:
+        return run, 0.0
+    start = float(run.outputs["hub_angle"][0])
+    outputs = {**run.outputs, "hub_angle": run.outputs["hub_angle"] - start}
+    references = {**run.references, "hub_angle": run.references["hub_angle"] - start}
+    return replace(run, outputs=outputs, references=references), start
 
 
 # free number of a fit: torque at the hub over what was commanded, in whatever unit that is

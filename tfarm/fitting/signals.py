@@ -67,17 +67,6 @@ UNITS: Mapping[str, tuple[str, float]] = MappingProxyType(
         "um/m": ("1", 1e-6),
     }
 )
-# rad: 16 turns of a hub, or a third of one in degrees
-MOST_ANGLE = 100.0
-# NAME=COLUMN[UNIT]*SCALE~SIGMA
-FORM = rf"""
-    ([^=]+?) \s*
-    (?: = \s* (.+?) \s* )?
-    (?: \[ ([^][]+) \] \s* )?
-    (?: \* \s* ({NUMBER}) \s* )?
-    (?: ~ \s* ({NUMBER}) )?
-"""
-KNOWN_UNITS = f"known units are: {list_within(UNITS, 400)}"
 
 
 @frozen(slots=True, kw_only=True)
@@ -105,15 +94,18 @@ class RecordSignal:
         Raises ParameterError for an unknown unit, for one of another quantity, for a scale of a column whose unit is
         not the SI one, where either may be meant, and for an angle beyond 100 rad of a column without a unit.
         """
-        found = re.search(r"\(([^()]+)\)$", self.column)
-        named = found[1] if found and known_unit(found[1]) else ""
-        written = self.unit or own or named
+        # rad: 16 turns of a hub, or a third of one in degrees
+        most_angle = 100.0
         key = f"unit of {self.column}"
         wanted = si_unit(self.name)
-        of = known_unit(written)
+        parentheses = re.search(r"\(([^()]+)\)$", self.column)
+        written = self.unit or own
+        if not written and parentheses and known_unit(parentheses[1]):
+            written = parentheses[1]
+        known = known_unit(written)
         if self.scale is not None and not self.unit:
             # of counts, volts, or nothing
-            is_plain = of is None or of[1] == 1.0
+            is_plain = known is None or known[1] == 1.0
             remedy = (
                 f"write {self.column}[{written}]*{self.scale:g} for SI values times the scale, or "
                 f"{self.column}[1]*{self.scale:g} for the numbers of the file times it"
@@ -125,11 +117,11 @@ class RecordSignal:
             remedy = (
                 f"its largest value is {largest:.4g}: write {self.name}={self.column}[deg], or [rad] if it is"
             )
-            require(wanted != "rad" or largest <= MOST_ANGLE, key, MISSING, remedy)
+            require(wanted != "rad" or largest <= most_angle, key, MISSING, remedy)
             return values
         another = f"or give a scale: {self.name}={self.column}*NUMBER"
-        require(of, key, written, f"{KNOWN_UNITS}; {another}")
-        unit, size = of  # type: ignore[misc]
+        require(known, key, written, f"known units are: {list_within(UNITS, 400)}; {another}")
+        unit, size = known  # type: ignore[misc]
         is_same = self.scale is not None or wanted in ("", unit)
         require(is_same, key, written, f"{self.name} is in {wanted}; {another}")
         return values * (size * (self.scale or 1.0))
@@ -140,7 +132,14 @@ def signal_of(text: str, key: str = "--signal") -> RecordSignal:
 
     Raises ParameterError for another form, for a scale of 0, and for a deviation that is not positive.
     """
-    found = re.fullmatch(FORM, text.strip(), re.VERBOSE | re.DOTALL)
+    form = rf"""
+        ([^=]+?) \s*
+        (?: = \s* (.+?) \s* )?
+        (?: \[ ([^][]+) \] \s* )?
+        (?: \* \s* ({NUMBER}) \s* )?
+        (?: ~ \s* ({NUMBER}) )?
+    """
+    found = re.fullmatch(form, text.strip(), re.VERBOSE | re.DOTALL)
     remedy = "write NAME=COLUMN, such as tip_acceleration=acc1, with a [unit], *scale or ~deviation"
     require(found, key, text, remedy)
     name, column, unit, scale, sigma = found.groups()  # type: ignore[union-attr]
