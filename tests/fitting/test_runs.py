@@ -430,3 +430,26 @@ def test_the_pages_of_a_fit_have_its_runs():
     assert measured.lines[0].get_ydata() == pytest.approx(found.problem.runs[0].measured[0])
     off = measured.lines[1].get_ydata() - measured.lines[0].get_ydata()
     assert residual.lines[0].get_ydata() == pytest.approx(off)
+
+
+def test_a_dead_time_of_none_ends_at_its_bound():
+    run = open_run(chain=chain_of(0.0), n=300)
+    found = fit(START, [], [*PLANTED], runs=[run], chain=chain_of(0.3), profile=True)
+    delay = found.parameters[-1]
+    assert delay.low == pytest.approx(0, abs=1e-9)
+    assert 0 <= delay.value < delay.high < 0.02 * T
+    assert_found(found, PLANTED | {"drive.delay": 0.0})
+
+
+def test_runs_and_frequency_responses_are_fitted_together():
+    """The response knows the stiffness, and the run the dead time."""
+    omega = np.geomspace(5.0, 300.0, 60)
+    H = tfarm.transfer(LAB, "root_moment")(1j * omega)
+    rng = np.random.default_rng(11)
+    noise = 0.02 * abs(H) * (rng.standard_normal(60) + 1j * rng.standard_normal(60))
+    data = tfarm.Measured(output="root_moment", input="hub_torque", omega=omega, values=H + noise, sigma=0.02 * abs(H))
+    found = fit(START, [data], [*PLANTED], runs=[open_run(n=300)], chain=chain_of(0.0), profile=False)
+    assert_found(found, PLANTED)
+    assert found.verdict == "fitted"
+    assert [row.name for row in found.response_list] == ["root_moment/hub_torque"]
+    assert len(found.run_signals) == 2
