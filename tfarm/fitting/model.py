@@ -238,6 +238,9 @@ class FitResponse:
         if self.noise.is_known:
             return self
         factor = math.sqrt((residuals @ residuals) / residuals.size * share)
+        # of a deviation: a change that moves no number
+        if abs(factor - 1) < 1e-6:
+            return self
         return replace(self, noise=replace(self.noise, sigma=self.noise.sigma * max(factor, 1e-12)))
 
     def over_deviation(self, values: Complex) -> Real:
@@ -373,20 +376,33 @@ class Problem:
         )
 
     def jacobian(self, point: Real) -> Real:
-        """Return the derivatives of the residuals (size, parameters)."""
-        here = self._terms(point)
+        """Return the derivatives of the residuals (size, parameters).
+
+        Those of a run are at constant own numbers, with what these can add projected out (Kaufman 1975).
+        """
+        arm = self.arm(point)
+        projections = [each.projection(arm, lambda place: self.value(point, place)) for each in self.runs]
+        own = [each.own for each in projections]
+        here = self._terms(point, own)
         # the rounding of a float over it is 1e-10, its square below
         size = 2.0**-20
-        return np.stack([self._slope(here, point, step) for step in size * np.eye(point.size)], axis=1)
+        steps = size * np.eye(point.size)
+        found = np.stack([self._slope(here, point, step, own) for step in steps], axis=1)
+        row = sum(each.size for each in self.responses)
+        for each in projections:
+            rows = found[row : row + each.residuals.size]
+            rows -= each.basis @ (each.basis.T @ rows)
+            row += each.residuals.size
+        return found
 
-    def _slope(self, here: tuple[list[Fraction], Real], point: Real, step: Real) -> Real:
+    def _slope(self, here: tuple[list[Fraction], Real], point: Real, step: Real, own: Sequence[Real]) -> Real:
         """Return the derivatives along one coordinate; from the arm itself where there is none on one side."""
         sides = [here, here]
         size = float(step.max())
         width = 0.0
         for side, to in enumerate((point - step, point + step)):
             with suppress(ParameterError):
-                sides[side] = self._terms(to)
+                sides[side] = self._terms(to, own)
                 width += size
         (below, low), (above, high) = sides
         slopes = []
@@ -398,8 +414,8 @@ class Problem:
             slopes.append(one.over_deviation((dN - N / D * dD) / D))
         return np.concatenate([*slopes, high - low]) / max(width, size)
 
-    def _terms(self, point: Real) -> tuple[list[Fraction], Real]:
-        """Return the responses, and what runs, decays and priors leave."""
+    def _terms(self, point: Real, own: Sequence[Real] = ()) -> tuple[list[Fraction], Real]:
+        """Return the responses, and what runs, decays and priors leave; `own` are the runs' numbers, if given."""
         coordinates = zip(self.parameters, point.tolist(), strict=True)
         priors = [
             (each.value(x) - each.prior[0]) / each.prior[1]
@@ -407,7 +423,15 @@ class Problem:
             if each.prior is not None
         ]
         arm = self.arm(point)
-        runs = [each.residuals(arm, lambda place: self.value(point, place)) for each in self.runs]
+
+        def value(place: int) -> float:
+            return self.value(point, place)
+
+        if own:
+            pairs = zip(self.runs, own, strict=True)
+            runs = [each.residuals_with(arm, value, numbers) for each, numbers in pairs]
+        else:
+            runs = [each.residuals(arm, value) for each in self.runs]
         return self.fractions(point), np.concatenate([*runs, self.decays(point, self.rings), priors])
 
     def decays(self, point: Real, rings: Sequence[RingMode]) -> Real:

@@ -51,6 +51,19 @@ class RunResponse(NamedTuple):
     by_own: Real
 
 
+class Projection(NamedTuple):
+    """Residuals (size,) of a run, orthonormal to `basis` (size, rank), at its `own` numbers (own,).
+
+    Columns of a unit of each own number have the norms `size`, and scaled to 1 the triangular factor `R`.
+    """
+
+    residuals: Real
+    basis: Real
+    own: Real
+    R: Real
+    size: Real
+
+
 @dataclass(frozen=True)
 class FitRun:
     """A run in a fit: through which `chain`, with `count` modes, and the deviations `sigma` of its outputs.
@@ -120,6 +133,9 @@ class FitRun:
         """Return it with each deviation that is not known as its own residuals say, times the root of a share."""
         rows = residuals.reshape(len(self.sigma), -1)
         factors = np.maximum(np.sqrt((rows**2).mean(axis=1) * share), 1e-12)
+        # of a deviation: a change that moves no number
+        if (abs(factors - 1) < 1e-6)[~np.array(self.is_known)].all():
+            return self
         sigma = np.array(self.sigma) * np.where(self.is_known, 1.0, factors)
         return replace(self, sigma=tuple(sigma.tolist()))
 
@@ -127,25 +143,30 @@ class FitRun:
 
     def respond(self, arm: Arm, value: Callable[[int], float]) -> RunResponse:
         """Return the outputs of an arm; `value` gives the number of a place in what is searched for."""
-        run = self.run
-        steady = np.ones(run.count)
         pulse = self.pulse(arm, value)
-        rows = [pulse.plant.outputs.index(name) for name in run.names]
-        if run.law is None:
-            assert run.input is not None
-            found = pulse.held_response(run.input)
-            columns = [pulse.held_response(steady), *self._free(pulse, rows)]
-        else:
-            loop = self.loop(arm, value)
-            zero = 0 * steady
-            found = pulse.held_response(loop.input(loop.wanted, zero))
-            at_once = PulseTransfer(pulse.plant, replace(pulse.sampling, delay_samples=0.0))
-            answer = pulse.held_response(loop.input(0 * loop.wanted, steady))
-            columns = [at_once.held_response(steady) + answer]
-            for on_signals in self._free(pulse, rows):
-                answer = pulse.held_response(loop.input(-loop.read(on_signals), zero))
-                columns.append(on_signals + answer)
+        loop = self.loop(arm, value, pulse)
+        rows = [pulse.plant.outputs.index(name) for name in self.run.names]
+        zero = np.zeros((len(pulse.plant.outputs), self.run.count))
+        columns = [self._motion(pulse, loop, 0.0, 1.0, zero)]
+        columns += [self._motion(pulse, loop, 0.0, 0.0, signals) for signals in self._free(pulse, rows)]
+        found = self._motion(pulse, loop, 1.0, 0.0, zero)
         return RunResponse(found[rows], np.array(columns)[:, rows])
+
+    def _motion(
+        self, pulse: PulseTransfer, loop: RunLoop | None, share: float, bias: float, signals: Real
+    ) -> Real:
+        """Return the outputs (names, n) under a share of the commands, a bias, and added signals (names, n)."""
+        steady = bias * np.ones(self.run.count)
+        if loop is None:
+            assert self.run.input is not None
+            u = share * self.run.input + steady
+            return pulse.held_response(u) + signals if u.any() else signals
+        u = loop.input(share * loop.wanted - loop.read(signals), steady)
+        found = pulse.held_response(u) + signals
+        if bias:
+            at_once = PulseTransfer(pulse.plant, replace(pulse.sampling, delay_samples=0.0))
+            found = found + at_once.held_response(steady)
+        return found
 
     def pulse(self, arm: Arm, value: Callable[[int], float]) -> PulseTransfer:
         """Return the plant of the run's signals at the samples of its record, times the gains of sensors.
@@ -161,10 +182,10 @@ class FitRun:
         by_output = np.array([gains[name] for name in names])
         return PulseTransfer(plant.times(by_output), at_period(chain, self.run.period).sampling)
 
-    def loop(self, arm: Arm, value: Callable[[int], float]) -> RunLoop:
-        """Return the controller round the plant of the run's signals."""
-        assert self.run.law is not None
-        pulse = self.pulse(arm, value)
+    def loop(self, arm: Arm, value: Callable[[int], float], pulse: PulseTransfer) -> RunLoop | None:
+        """Return the controller round the plant of the run's signals; None of an open loop."""
+        if self.run.law is None:
+            return None
         acting, late = acting_law(Case(arm, self.run.law, self._chain(value)))
         return RunLoop(self.run, self.ratio, LinearLoop(pulse.plant, acting, late))
 
@@ -218,41 +239,54 @@ class FitRun:
 
     def residuals(self, arm: Arm, value: Callable[[int], float]) -> Real:
         """Return computed less measured over the deviations (size,), the run's own numbers at their least squares."""
-        off, basis, _ = self._projection(arm, value)
-        return off - basis @ (basis.T @ off)
+        return self.projection(arm, value).residuals
+
+    def residuals_with(self, arm: Arm, value: Callable[[int], float], own: Real) -> Real:
+        """Return computed less measured over the deviations (size,), the run's own numbers (own,) given."""
+        pulse = self.pulse(arm, value)
+        loop = self.loop(arm, value, pulse)
+        rows = [pulse.plant.outputs.index(name) for name in self.run.names]
+        bias, *others = own.tolist()
+        signals = np.zeros((len(pulse.plant.outputs), self.run.count))
+        for number, one in zip(others, self._free(pulse, rows), strict=False):
+            signals += number * one
+        parts = (self._motion(pulse, loop, 1.0, bias, signals)[rows] - self.measured)[None]
+        return self._whitened(arm, value, parts)[0]
 
     def own_numbers(self, arm: Arm, value: Callable[[int], float]) -> tuple[Real, Real]:
         """Return the run's own numbers and their standard deviations; not a number where they are not determined."""
-        off, _, columns = self._projection(arm, value)
-        size = np.linalg.norm(columns, axis=0)
-        is_seen = size > 0
-        scaled = columns[:, is_seen] / size[is_seen]
-        found = np.full((2, size.size), math.nan)
-        found[0, is_seen] = -np.linalg.lstsq(scaled, off)[0] / size[is_seen]
-        spread = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
-        found[1, is_seen] = np.sqrt(np.diag(spread)) / size[is_seen]
-        return found[0], found[1]
+        found = self.projection(arm, value)
+        spread = np.sqrt(np.diag(np.linalg.pinv(found.R.T @ found.R, hermitian=True)))
+        size = found.size
+        with np.errstate(divide="ignore", invalid="ignore"):
+            deviations = np.where(size > 0, spread / size, math.nan)
+        return np.where(size > 0, found.own, math.nan), deviations
 
-    def _projection(self, arm: Arm, value: Callable[[int], float]) -> tuple[Real, Real, Real]:
-        """Return the residuals with own numbers of 0, an orthonormal basis of what these can add, and their columns."""
+    def projection(self, arm: Arm, value: Callable[[int], float]) -> Projection:
+        """Return the residuals without what the run's own numbers can add, and these numbers."""
         found = self.respond(arm, value)
         parts = np.concatenate([(found.outputs - self.measured)[None], found.by_own])
+        off, *columns = self._whitened(arm, value, parts)
+        size = np.linalg.norm(columns, axis=1)
+        scaled = np.transpose(columns) / np.where(size > 0, size, 1.0)
+        Q, R = np.linalg.qr(scaled)
+        # a column that others make up adds nothing
+        basis = Q[:, abs(np.diag(R)) > 1e-9]
+        own = -np.linalg.lstsq(R, Q.T @ off)[0] / np.where(size > 0, size, 1.0)
+        return Projection(off - basis @ (basis.T @ off), basis, own, R, size)
+
+    def _whitened(self, arm: Arm, value: Callable[[int], float], parts: Real) -> Real:
+        """Return deviations (rows, outputs, n) as errors of the noise model over its deviations, (rows, size)."""
         require(np.isfinite(parts).all(), "run", self.run.source, "the loop of this arm grows without bound")
         if self.through_loop:
             parts = self.innovations(arm, value, parts)
-        parts = (parts / np.array(self.sigma)[:, None]).reshape(len(parts), -1)
-        off = parts[0]
-        columns = parts[1:].T
-        size = np.linalg.norm(columns, axis=0)
-        seen = columns[:, size > 0] / size[size > 0]
-        Q, R = np.linalg.qr(seen)
-        # a column that others make up adds nothing
-        return off, np.asarray(Q[:, abs(np.diag(R)) > 1e-9]), columns
+        return (parts / np.array(self.sigma)[:, None]).reshape(len(parts), -1)
 
     def innovations(self, arm: Arm, value: Callable[[int], float], parts: Real) -> Real:
         """Return (1 + L) of deviations (rows, outputs, n): what the noise of sensors was before it went round."""
         pulse = self.pulse(arm, value)
-        loop = self.loop(arm, value)
+        loop = self.loop(arm, value, pulse)
+        assert loop is not None
         rows = [pulse.plant.outputs.index(name) for name in self.run.names]
         found = []
         for part in parts:

@@ -16,6 +16,7 @@ interval rests on Gaussian residuals alone.
 """
 
 import math
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
@@ -238,7 +239,8 @@ def best_solution(problem: Problem, is_enough: Callable[[Solution], bool | None]
         best = min(found, key=lambda each: each.misfit)
         if best.converged and (is_enough or is_explained)(best):
             break
-    if open_axes(best.jacobian).size:
+    # a search on runs has begun there already
+    if open_axes(best.jacobian).size and not problem.runs:
         at_start = rescale_noise(nearest_minimum(*with_gains(problem, problem.start)))
         found.append(at_start)
         if at_start.misfit < best.misfit - SAME_SUM:
@@ -271,14 +273,29 @@ def solution_of_runs(problem: Problem, draws: int) -> Solution:
     for duration in (least, math.sqrt(least * whole), whole):
         part = replace(problem, runs=tuple(each.until(duration) for each in problem.runs))
         kept = sorted(points, key=partial(sum_of_squares, part))[: 3 if duration == least else 2]
-        points = [nearest_minimum(part, each, evaluations=20).point for each in kept]
-    best = min((nearest_minimum(problem, each) for each in points), key=lambda each: each.chi_squared)
-    best = rescale_noise(best)
+        found = [nearest_minimum(part, each, evaluations=20, change=1e-3) for each in kept]
+        points = [each.point for each in distinct(found)]
+    # noise of unknown size is weighed again, so that the search goes on
+    change = 1e-9 if found[0].has_known_noise else 1e-6
+    ends = [nearest_minimum(problem, each, change=change) for each in points]
+    best = rescale_noise(min(ends, key=lambda each: each.chi_squared))
     if any(each.reads_all for each in problem.runs):
         around = tuple(replace(each, through_loop=each.reads_all) for each in best.problem.runs)
         other = rescale_noise(nearest_minimum(replace(best.problem, runs=around), best.point))
         best = min(best, other, key=lambda each: each.misfit)
     return best
+
+
+def distinct(found: Sequence[Solution]) -> list[Solution]:
+    """Return solutions, the least sum of squares first, without those that the data cannot tell from a lesser one."""
+    kept: list[Solution] = []
+    for one in sorted(found, key=lambda each: each.chi_squared):
+        # of a sum of squares with a unit of reduced chi-squared: what the linearised residuals differ by
+        unit = one.chi_squared / max(one.freedom, 1)
+        apart = [one.jacobian @ (one.point - each.point) for each in kept]
+        if all(step @ step > unit for step in apart):
+            kept.append(one)
+    return kept
 
 
 def nearest_to_start(found: Solution) -> Solution:
@@ -289,15 +306,19 @@ def nearest_to_start(found: Solution) -> Solution:
     """
     least = found.chi_squared
     problem = found.problem
+    count = 0
     for limit, most in ((OPEN_DEVIATION, SAME_SUM), (0.1, EXCLUDED)):
         some = open_axes(found.jacobian, limit)
-        if not some.size:
+        # a wider limit with no more axes leads to the same point
+        if len(some) > count:
+            count = len(some)
+            start = found.point - some.T @ (some @ found.point)
+            held = {n: float(start[n]) for n in abs(some).argmax(axis=1).tolist()}
+            back = nearest_minimum(problem, start, held)
+            # a logarithm may have ended where it changes nothing
+            again = nearest_minimum(problem, back.point)
+        if not count:
             continue
-        start = found.point - some.T @ (some @ found.point)
-        held = {n: float(start[n]) for n in abs(some).argmax(axis=1).tolist()}
-        back = nearest_minimum(problem, start, held)
-        # a logarithm may have ended where it changes nothing
-        again = nearest_minimum(problem, back.point)
         if again.converged and again.chi_squared < least - SAME_SUM:
             return nearest_to_start(again)
         back = replace(back, jacobian=problem.jacobian(back.point), converged=found.converged)
@@ -336,9 +357,16 @@ def is_explained(one: Solution) -> bool | None:
 
 
 def nearest_minimum(
-    problem: Problem, start: Real, held: dict[int, float] | None = None, evaluations: int = 60
+    problem: Problem,
+    start: Real,
+    held: dict[int, float] | None = None,
+    evaluations: int = 60,
+    change: float = 1e-9,
 ) -> Solution:
-    """Return the nearest minimum from a start, some coordinates held at a value, by a limited number of evaluations."""
+    """Return the nearest minimum from a start, some coordinates held at a value, by a limited number of evaluations.
+
+    The search ends where the sum of squares falls by less than a relative `change`.
+    """
     held = held or {}
     point = start.copy()
     point[list(held)] = list(held.values())
@@ -364,7 +392,7 @@ def nearest_minimum(
         bounds=(low[free], high[free]),
         x_scale="jac",
         xtol=1e-7,
-        ftol=1e-9,
+        ftol=change,
         gtol=None,
         max_nfev=evaluations,
     )
@@ -382,6 +410,8 @@ def rescale_noise(found: Solution) -> Solution:
         share = found.residuals.size / max(found.freedom, 1)
         pairs = zip(found.problem.records, found.parts, strict=True)
         records: Any = [each.rescaled(own, share) for each, own in pairs]
+        if all(map(operator.is_, records, found.problem.records)):
+            break
         problem = replace(found.problem, responses=tuple(records[:count]), runs=tuple(records[count:]))
         found = nearest_minimum(problem, found.point)
     return found
