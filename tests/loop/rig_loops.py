@@ -56,8 +56,8 @@ class RigLoop:
         s = self.eigenvalues(law)
         return int((s.real > 1e-9 * abs(s) + 1e-7 * self.a).sum())
 
-    def sampled(self, law, period):
-        """Eigenvalues z of the loop sampled every period [s], its input held in between, of one that acts at once.
+    def state_space(self):
+        """A, B of x' = A x + B input, of one that acts at once, and rows (2, x) of a motion and its rate from its row.
 
         Modes of K + a^2 M and M, of which 1/(w^2 + a^2) has the digits; states sqrt(w^2 + a^2) q and q_t of each.
         """
@@ -68,12 +68,22 @@ class RigLoop:
         unit = np.sqrt(size[kept])
         shapes = solve_triangular(root, shapes[:, kept]) / unit
         n = unit.size
-        A = np.zeros((2 * n + 1, 2 * n + 1))
-        A[:n, n : 2 * n] = np.diag(1 / unit)
-        A[n : 2 * n, :n] = np.diag(self.a**2 * unit - 1 / unit)
-        A[n : 2 * n, n : 2 * n] = -shapes.T @ self.D @ shapes
-        A[n : 2 * n, -1] = shapes.T @ self.works
-        held = expm(A * period)[: 2 * n]
-        angle, gauge = shapes.T @ self.hub, shapes.T @ self.gauge
-        fed_back = np.r_[(law.Kp * angle + law.K2 * gauge) * unit, law.K1 * angle]
+        A = np.zeros((2 * n, 2 * n))
+        A[:n, n:] = np.diag(1 / unit)
+        A[n:, :n] = np.diag(self.a**2 * unit - 1 / unit)
+        A[n:, n:] = -shapes.T @ self.D @ shapes
+
+        def rows(row):
+            modal = row @ shapes
+            return np.array([np.r_[modal * unit, 0 * modal], np.r_[0 * modal, modal]])
+
+        return A, np.r_[np.zeros(n), shapes.T @ self.works], rows
+
+    def sampled(self, law, period):
+        """Eigenvalues z of the loop sampled every period [s], its input held in between, of one that acts at once."""
+        A, B, rows = self.state_space()
+        whole = np.block([[A, B[:, None]], [np.zeros((1, len(A) + 1))]])
+        held = expm(whole * period)[:-1]
+        angle, rate = rows(self.hub)
+        fed_back = law.Kp * angle + law.K1 * rate + law.K2 * rows(self.gauge)[0]
         return eigvals(held[:, :-1] - np.outer(held[:, -1], fed_back))
