@@ -205,7 +205,8 @@ SENSOR_DELAY = "delay"
 
 def is_of_chain(key: str) -> bool:
     """Return whether a free number is a sensor's or of the drive's dead time, and none of the arm's."""
-    return key in (SENSOR_GAIN, SENSOR_DELAY, DRIVE_DELAY) or key.startswith(f"{SENSOR_GAIN}:")
+    starts = (f"{SENSOR_GAIN}:", f"{DRIVE_DELAY}:")
+    return key in (SENSOR_GAIN, SENSOR_DELAY, DRIVE_DELAY) or key.startswith(starts)
 
 
 @dataclass(frozen=True)
@@ -264,13 +265,18 @@ class Fraction(NamedTuple):
 
 @dataclass(frozen=True)
 class Problem:
-    """What is searched for: `parameters` of the arm first, then those of the sensors, and what they have to explain."""
+    """What is searched for: `parameters` of the arm first, then those of the sensors, and what they have to explain.
+
+    Runs may be of several arms, the family's own and `others`, the rest is of the first.  A number that not all of them
+    share has the arm's name in its key: "link.length:ruler".
+    """
 
     family: KeyedArms
     parameters: tuple[Parameter, ...]
     responses: tuple[FitResponse, ...]
     rings: tuple[RingMode, ...] = ()
     runs: tuple[FitRun, ...] = ()
+    others: tuple[KeyedArms, ...] = ()
 
     @property
     def records(self) -> tuple[FitResponse | FitRun, ...]:
@@ -279,8 +285,8 @@ class Problem:
 
     @cached_property
     def of_the_arm(self) -> tuple[Parameter, ...]:
-        """The parameters that are the arm's."""
-        return self.parameters[: len(self.family.keys)]
+        """The parameters that are the arm's, or one of the arms'."""
+        return tuple(each for each in self.parameters if each.key.partition(":")[0] in self.family.keys)
 
     @cached_property
     def bounds(self) -> tuple[Real, Real]:
@@ -298,11 +304,19 @@ class Problem:
         low, high = self.bounds
         return np.clip(point, low + by, high - by)
 
-    def arm(self, point: Real) -> Arm:
-        """Return the arm at a point."""
-        return self.family.at(
-            {each.key: each.value(x) for each, x in zip(self.of_the_arm, point.tolist(), strict=False)}
-        )
+    def arm(self, point: Real, number: int = 0) -> Arm:
+        """Return the arm at a point, by its number where there are several."""
+        family = (self.family, *self.others)[number]
+        values = {}
+        for each, x in zip(self.of_the_arm, point.tolist(), strict=False):
+            key, _, name = each.key.partition(":")
+            if name in ("", family.arm.name):
+                values[key] = each.value(x)
+        return family.at(values)
+
+    def arms(self, point: Real) -> list[Arm]:
+        """Return all arms at a point."""
+        return [self.arm(point, number) for number in range(1 + len(self.others))]
 
     def value(self, point: Real, place: int) -> float:
         """Return the number of that place in the vector at a point."""
@@ -380,8 +394,10 @@ class Problem:
 
         Those of a run are at constant own numbers, with what these can add projected out (Kaufman 1975).
         """
-        arm = self.arm(point)
-        projections = [each.projection(arm, lambda place: self.value(point, place)) for each in self.runs]
+        arms = self.arms(point)
+        projections = [
+            each.projection(arms[each.arm], lambda place: self.value(point, place)) for each in self.runs
+        ]
         own = [each.own for each in projections]
         here = self._terms(point, own)
         # the rounding of a float over it is 1e-10, its square below
@@ -422,16 +438,16 @@ class Problem:
             for each, x in coordinates
             if each.prior is not None
         ]
-        arm = self.arm(point)
+        arms = self.arms(point)
 
         def value(place: int) -> float:
             return self.value(point, place)
 
         if own:
             pairs = zip(self.runs, own, strict=True)
-            runs = [each.residuals_with(arm, value, numbers) for each, numbers in pairs]
+            runs = [each.residuals_with(arms[each.arm], value, numbers) for each, numbers in pairs]
         else:
-            runs = [each.residuals(arm, value) for each in self.runs]
+            runs = [each.residuals(arms[each.arm], value) for each in self.runs]
         return self.fractions(point), np.concatenate([*runs, self.decays(point, self.rings), priors])
 
     def decays(self, point: Real, rings: Sequence[RingMode]) -> Real:
@@ -443,46 +459,6 @@ class Problem:
             if each.ratio is not None:
                 rows.append((-s.real / abs(s) - each.ratio) / each.ratio_deviation)
         return np.array(rows)
-
-
-def with_run_numbers(
-    problem: Problem,
-    free: Sequence[str],
-    start: Mapping[str, float],
-    bounds: Mapping[str, tuple[float, float]],
-    priors: Mapping[str, tuple[float, float]],
-) -> Problem:
-    """Return the problem with the drive's dead time and gains of sensors free, which its runs have in common.
-
-    Raises ParameterError for a gain of a signal that no run has.
-    """
-    own = [*problem.parameters]
-    runs = [*problem.runs]
-    for key in free:
-        name = key.partition(":")[2]
-        if key == DRIVE_DELAY:
-            require(runs, "free", key, "is of a run: give one, or leave it out")
-            sampling = runs[0].chain.sampling
-            at = start.get(key, sampling.delay_samples * sampling.period)
-            low, high = bounds.get(key, (0.0, 50 * runs[0].run.period))
-            size = runs[0].run.period
-            runs = [replace(each, delay=len(own)) for each in runs]
-        elif name:
-            require(any(name in each.run.names for each in runs), "free", key, "no run has that signal")
-            at = start.get(key, 1.0)
-            low, high = bounds.get(key, (0.0, math.inf))
-            size = 0.0
-            place = len(own)
-            runs = [
-                replace(each, gains=(*each.gains, (name, place))) if name in each.run.names else each
-                for each in runs
-            ]
-        else:
-            continue
-        remedy = f"starts at {at:g}; give bounds low,high around it, or another start"
-        require(low <= at <= high and low < high, f"bounds of {key}", (low, high), remedy)
-        own.append(Parameter(key, at, low, high, size, priors.get(key)))
-    return replace(problem, parameters=tuple(own), runs=tuple(runs))
 
 
 def penalize(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], Real]:

@@ -71,6 +71,7 @@ class FitRun:
     `is_known` (outputs,) is whether a deviation was given, or is that of the residuals.  `gains` has the places of
     sensors' gains in the vector of what is searched for, `delay` that of the drive's dead time.  `own` is how many
     numbers it has of its own: with `is_moving` also the hub's drift and amplitudes of the lowest modes at the start.
+    `arm` is the number of its arm, where there are several.
     """
 
     run: Run
@@ -83,6 +84,7 @@ class FitRun:
     through_loop: bool = False
     gains: tuple[tuple[str, int], ...] = ()
     delay: int | None = None
+    arm: int = 0
 
     @property
     def size(self) -> int:
