@@ -28,6 +28,7 @@ from tfarm.fitting.data import Measured as Measured
 from tfarm.fitting.data import read_measured as read_measured
 from tfarm.fitting.fit import fit as fit
 from tfarm.fitting.overlay import overlay as overlay
+from tfarm.fitting.together import fit_together as fit_together
 from tfarm.loop.locus import locus as locus
 from tfarm.loop.margins import margins as margins
 from tfarm.loop.norms import norm as norm

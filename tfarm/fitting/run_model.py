@@ -11,6 +11,10 @@ A bias is integrated twice by a hub that turns freely.
 
 Noise of a sensor e that the controller reads acts on the arm, too: what it leaves is S e.  With the loop L of the same
 arm e = (1 + L) S e is white again (`through_loop`), as the errors of a prediction by the recorded signals are.
+
+Where only the input is known under a controller, and the sensors' noise is white, output errors are white and have
+no bias: u_k depends on noise up to y_k, and what u_k does is seen from y_{k+1} on.  A torque on the input makes them
+neither.  The errors of the stationary Kalman predictor are both, in open loop, too (Ljung 1999, section 13.5).
 """
 
 from __future__ import annotations
@@ -22,6 +26,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.linalg import solve_discrete_are
 from scipy.special import chdtrc
 
 from tfarm.arm import AT_HUB, Arm
@@ -29,13 +34,14 @@ from tfarm.arm.chain import Chain
 from tfarm.arrays import Real
 from tfarm.case import Case
 from tfarm.dsp.discretise import acting_law
+from tfarm.dsp.kernel import law_outputs
 from tfarm.dsp.plant import Plant
 from tfarm.dsp.pulse import PulseTransfer
 from tfarm.dsp.results import ideal_chain
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.sensed import sensed_plant
 from tfarm.dsp.simulate import LinearLoop, references_of
-from tfarm.errors import require
+from tfarm.errors import ParameterError, require
 from tfarm.fitting.runs import Run
 from tfarm.records import frozen
 from tfarm.spectrum import modes_below
@@ -71,7 +77,8 @@ class FitRun:
     `is_known` (outputs,) is whether a deviation was given, or is that of the residuals.  `gains` has the places of
     sensors' gains in the vector of what is searched for, `delay` that of the drive's dead time.  `own` is how many
     numbers it has of its own: with `is_moving` also the hub's drift and amplitudes of the lowest modes at the start.
-    `arm` is the number of its arm, where there are several.
+    `arm` is the number of its arm, where there are several.  `disturbance` has the places of the deviations of a torque
+    on the input over those of each output's noise, where errors are those of the Kalman predictor.
     """
 
     run: Run
@@ -85,6 +92,7 @@ class FitRun:
     gains: tuple[tuple[str, int], ...] = ()
     delay: int | None = None
     arm: int = 0
+    disturbance: tuple[int, ...] = ()
 
     @property
     def size(self) -> int:
@@ -282,6 +290,8 @@ class FitRun:
         require(np.isfinite(parts).all(), "run", self.run.source, "the loop of this arm grows without bound")
         if self.through_loop:
             parts = self.innovations(arm, value, parts)
+        if self.disturbance:
+            parts = self.prediction_errors(arm, value, parts)
         return (parts / np.array(self.sigma)[:, None]).reshape(len(parts), -1)
 
     def innovations(self, arm: Arm, value: Callable[[int], float], parts: Real) -> Real:
@@ -296,6 +306,38 @@ class FitRun:
             read[rows] = -part
             found.append(part - pulse.held_response(loop.input_alone(loop.read(read)))[rows])
         return np.array(found)
+
+    def prediction_errors(self, arm: Arm, value: Callable[[int], float], parts: Real) -> Real:
+        """Return deviations (rows, outputs, n) less what the stationary Kalman predictor has of them from the past.
+
+        x+ = A x + B (u + w), y = C x + v with white w, v: the errors e = y - C x' of x'+ = A x' + B u + K e are white,
+        K = A P C' S^-1, S = C P C' + R.  Those of one sample are made independent by a triangular matrix with 1 on its
+        diagonal, so that likelihoods compare.
+        """
+        pulse = self.pulse(arm, value)
+        A, _, C = pulse.matrices()
+        at_once = PulseTransfer(pulse.plant, replace(pulse.sampling, delay_samples=0.0))
+        states = pulse.integrals_at + 2
+        by_torque = np.zeros(len(A))
+        by_torque[:states] = at_once.matrices()[1][:states]
+        rows = [pulse.plant.outputs.index(name) for name in self.run.names]
+        # outputs over their noise, and a torque of deviation 1
+        ratio = np.array([value(place) for place in self.disturbance])
+        seen = C[rows] * ratio[:, None]
+        unit = np.eye(len(rows))
+        try:
+            P = solve_discrete_are(A.T, seen.T, np.outer(by_torque, by_torque), unit)
+        except np.linalg.LinAlgError:
+            remedy = "no stationary predictor of this arm was found"
+            raise ParameterError(key="run", value=self.run.source, remedy=remedy) from None
+        S = seen @ P @ seen.T + unit
+        K = np.linalg.solve(S, seen @ P @ A.T).T * ratio
+        L = np.linalg.cholesky(S)
+        monic = np.diag(L)[:, None] * np.linalg.inv(L) * ratio / ratio[:, None]
+        predictor = np.hstack([A - K @ C[rows], K])
+        # of a triangular matrix times [-C, 1]
+        tables = [np.vstack([predictor, row]) for row in monic @ np.hstack([-C[rows], unit])]
+        return np.array([[law_outputs(table, part.T) for table in tables] for part in parts])
 
     @property
     def reads_all(self) -> bool:

@@ -1,10 +1,12 @@
-"""Free numbers of the chain of runs: the dead time of their drive, and gains of sensors."""
+"""Free numbers of the chain of runs: the dead time of their drive, gains of sensors, and a torque disturbance."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from tfarm.errors import require
 from tfarm.fitting.model import Parameter, Problem
@@ -62,3 +64,31 @@ def with_run_numbers(
         for number, family in enumerate((problem.family, *problem.others)):
             add(key, f"{key}:{family.arm.name}", [each for each in problem.runs if each.arm == number])
     return problem
+
+
+DISTURBANCE = "disturbance"
+
+
+def with_disturbance(problem: Problem) -> Problem:
+    """Return the problem with a torque on the input of its runs without a controller, its deviations free.
+
+    One number an arm and signal: the deviation of a white torque, held over a sample, over that of the signal's noise.
+    The sizes of the prediction errors, which are not the sensors' noise, follow from the residuals.
+    """
+    parameters = [*problem.parameters]
+    families = (problem.family, *problem.others)
+    places: dict[str, int] = {}
+    runs = []
+    for each in problem.runs:
+        if each.run.input is not None and each.run.law is None:
+            name = f":{families[each.arm].arm.name}" if problem.others else ""
+            keys = [f"{DISTURBANCE}:{signal}{name}" for signal in each.run.names]
+            for key, sigma in zip(keys, each.sigma, strict=True):
+                if key not in places:
+                    places[key] = len(parameters)
+                    start = 0.1 * (float(np.std(each.run.input)) or 1.0) / sigma
+                    parameters.append(Parameter(key, start, 0.0, math.inf))
+            unknown = (False,) * len(keys)
+            each = replace(each, disturbance=tuple(places[key] for key in keys), is_known=unknown)
+        runs.append(each)
+    return replace(problem, parameters=tuple(parameters), runs=tuple(runs))

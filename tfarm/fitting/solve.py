@@ -31,6 +31,7 @@ from tfarm.errors import ParameterError
 from tfarm.fitting.data import CONFIDENCE, in_parts
 from tfarm.fitting.model import Problem, penalize
 from tfarm.fitting.run_model import chance_of_white
+from tfarm.fitting.run_numbers import with_disturbance
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency
@@ -270,11 +271,13 @@ def solution_of_runs(problem: Problem, draws: int) -> Solution:
         points.append(best_solution(replace(problem, runs=())).point)
     least = periods * 2 * math.pi / first_frequency(problem.arm(start))
     whole = max(each.run.count * each.run.period for each in problem.runs)
+    first: list[Real] = []
     for duration in (least, math.sqrt(least * whole), whole):
         part = replace(problem, runs=tuple(each.until(duration) for each in problem.runs))
         kept = sorted(points, key=partial(sum_of_squares, part))[: 3 if duration == least else 2]
         found = [nearest_minimum(part, each, evaluations=20, change=1e-3) for each in kept]
         points = [each.point for each in distinct(found)]
+        first = first or points
     # noise of unknown size is weighed again, so that the search goes on
     change = 1e-9 if found[0].has_known_noise else 1e-6
     ends = [nearest_minimum(problem, each, change=change) for each in points]
@@ -283,7 +286,28 @@ def solution_of_runs(problem: Problem, draws: int) -> Solution:
         around = tuple(replace(each, through_loop=each.reads_all) for each in best.problem.runs)
         other = rescale_noise(nearest_minimum(replace(best.problem, runs=around), best.point))
         best = min(best, other, key=lambda each: each.misfit)
+    is_driven = any(each.run.law is None for each in best.problem.runs)
+    if is_driven and best.chance_of_white <= LEAST_CHANCE:
+        other = solution_with_disturbance(best, [start, *first])
+        # each ratio has to explain more than noise alone would
+        least = EXCLUDED / 2 * (other.point.size - best.point.size)
+        best = min(best, other, key=lambda each: each.misfit + (least if each is other else 0.0))
     return best
+
+
+def solution_with_disturbance(found: Solution, starts: Sequence[Real]) -> Solution:
+    """Return the least prediction errors over starts, with a torque on the input of unknown size.
+
+    The predictor follows the record, so that its errors have few minima where output errors have many.
+    """
+    problem = with_disturbance(found.problem)
+    more = len(problem.parameters) - found.point.size
+    # of the first ratio of deviations: a search finds the rest
+    ratios = np.log([0.01, 0.1, 1.0, 10.0])
+    points = [np.r_[each, np.full(more, ratio)] for each in (found.point, *starts) for ratio in ratios]
+    first = sorted(points, key=partial(sum_of_squares, problem))[:2]
+    ends = [nearest_minimum(problem, each, change=1e-6) for each in first]
+    return rescale_noise(min(ends, key=lambda each: each.chi_squared))
 
 
 def distinct(found: Sequence[Solution]) -> list[Solution]:
