@@ -13,10 +13,19 @@ from tfarm.errors import one_line
 from tfarm.fitting.data import NUMBER
 
 if TYPE_CHECKING:
-    from tfarm.fitting.fit import Fit
+    from collections.abc import Sequence
+
+    from tfarm.fitting.data import Measured
+    from tfarm.fitting.intervals import Fitted
 
 
-def assumptions_of(fit: Fit, family: KeyedArms) -> tuple[str, ...]:
+def assumptions_of(
+    family: KeyedArms,
+    fitted: Sequence[Fitted],
+    in_words: str,
+    responses: Sequence[Measured],
+    not_determined: Sequence[str],
+) -> tuple[str, ...]:
     """Return an arm's assumptions, marked where they name a fitted number, then the fit and its data."""
     # characters of a file in an assumption
     longest_name = 200
@@ -26,16 +35,16 @@ def assumptions_of(fit: Fit, family: KeyedArms) -> tuple[str, ...]:
         labels = [file_key(key).label for key in family.keys if is_named(key, family.value(key), text)]
         mark = f"Before the fit of {join_words(labels)}: " if labels else ""
         texts.append(mark + text.removeprefix(mark))
-    numbers = [each for each in fit.parameters if "." in each.key]
+    numbers = [each for each in fitted if "." in each.key]
     values = [f"{each.label} = {each.value:.6g} {file_key(each.key).unit}".rstrip() for each in numbers]
     values = values or ["sensors alone"]
-    texts.append(f"Fitted: {join_words(values)}, from the arm {family.arm.name}; {fit.in_words}.")
-    for each in fit.responses:
+    texts.append(f"Fitted: {join_words(values)}, from the arm {family.arm.name}; {in_words}.")
+    for each in responses:
         digest = each.digest or "none"
         texts.append(
             f"Fitted to {each.label} of {one_line(Path(each.source).name, longest_name)}, SHA-256 {digest}."
         )
-    return (*texts, *(f"Of the fit: {words}." for words in fit.not_determined))
+    return (*texts, *(f"Of the fit: {words}." for words in not_determined))
 
 
 def is_named(key: str, value: float, text: str) -> bool:

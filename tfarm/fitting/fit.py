@@ -20,7 +20,7 @@ from scipy.special import gammaincinv
 
 from tfarm.arm import Arm, must_be_arm
 from tfarm.arm.chain import Chain
-from tfarm.arm.writing import to_toml
+from tfarm.arm.writing import KeyedArms, to_toml
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, require
 from tfarm.files import is_standard_output, write_file
@@ -103,6 +103,10 @@ class Fit(Solution):
         """The arm that the fit began with."""
         return self.before.name
 
+    def assumptions(self, family: KeyedArms) -> tuple[str, ...]:
+        """Return the assumptions of one of its arms."""
+        return assumptions_of(family, self.parameters, self.in_words, self.responses, self.not_determined)
+
     @cached_property
     def arms(self) -> tuple[Arm, ...]:
         """All arms of the fit at the fitted numbers, the first as `arm`."""
@@ -110,7 +114,7 @@ class Fit(Solution):
         pairs = zip(self.problem.others, self.problem.arms(self.point)[1:], strict=True)
         for family, arm in pairs:
             name = f"{arm.name}-fitted"
-            found.append(replace(arm, name=name, assumptions=assumptions_of(self, family)))
+            found.append(replace(arm, name=name, assumptions=self.assumptions(family)))
         return tuple(found)
 
     @property
@@ -355,7 +359,7 @@ def fit_of(subject: Problem, profile: bool, progress: Progress | None) -> Fit:
         not_determined=unknown,
         interval_by="profile likelihood" if profile else "covariance",
     )
-    return replace(fit, arm=replace(fit.arm, assumptions=assumptions_of(fit, subject.family)))
+    return replace(fit, arm=replace(fit.arm, assumptions=fit.assumptions(subject.family)))
 
 
 def renamed(given: Mapping[str, Any] | None) -> dict[str, Any]:
