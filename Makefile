@@ -36,6 +36,7 @@ SURVEYS := \
 	loop.single_laws \
 	loop.norms \
 	fitting.planted \
+	fitting.expected \
 	studies.kills \
 	studies.planted \
 	tuner.bounded \

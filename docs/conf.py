@@ -25,7 +25,7 @@ from tfarm.assessment import step
 from tfarm.cli.running import whole_command
 from tfarm.dsp import kernel
 from tfarm.exported import controller, fmu, live_loop, systems, tuner_code
-from tfarm.fitting.recording import RunTable
+from tfarm.fitting.run_files import RunTable
 from tfarm.loop import sampled_verdict, stability
 from tfarm.schema.glossary import CERTAINTY, declared_records
 from tfarm.synthesis import design

@@ -22,10 +22,11 @@ from tfarm.arm.chain import load_chain
 from tfarm.arm.law_tables import load_law
 from tfarm.assessment.card import GRADE_LIMITS
 from tfarm.audit.published import Validation, validate
-from tfarm.case import Case
 from tfarm.digits import general
 from tfarm.fitting.decays import fit_ringdown
-from tfarm.fitting.recording import compare_run, load_run, overshoot, read_recording
+from tfarm.fitting.recording import read_recording
+from tfarm.fitting.run_files import load_run
+from tfarm.fitting.signals import UNITS
 from tfarm.spectrum.table import hub_locked
 from tfarm.synthesis.requirements import MEASURES
 from tfarm.synthesis.structures import STRUCTURES
@@ -180,24 +181,25 @@ def _time(seconds: float) -> str:
 
 @table
 def rig_laws() -> list[str]:
-    """Verdicts on the two controllers of a real rig, and their measured steps against the exact sampled loop."""
+    """Verdicts on the two controllers of a real rig, and their measured steps against the predicted ones."""
     arm, chain = tfarm.load(str(RIG / "rig.toml")), load_chain(RIG / "rig.toml")
     rows = []
     for name in ("lqg", "hinf"):
         law, run = load_law(RIG / f"{name}.toml"), load_run(RIG / f"{name}.toml")
-        found = compare_run(Case(arm, law, chain), run)
-        step, end = run.step, run.reference[-1]
-        shares = (overshoot(each, step, end) for each in (run.hub_angle, found.hub_angle))
-        rows.append(
-            [
-                name,
-                tfarm.sampled(arm, law, chain).verdict.sentence,
-                *(f"{100 * each:.1f} %" for each in shares),
-            ]
-        )
-    return markdown_table(
-        ("controller", "sampled loop", "overshoot, measured", "overshoot, exact loop"), rows
-    )
+        measured, predicted, *_ = tfarm.predict(arm, run.run, chain).rows
+        shares = [f"{100 * each.overshoot:.1f} %" for each in (measured, predicted)]
+        rows.append([name, tfarm.sampled(arm, law, chain).verdict.sentence, *shares])
+    titles = ("controller", "sampled loop", "overshoot, measured", "overshoot, predicted")
+    return markdown_table(titles, rows)
+
+
+@table
+def units() -> list[str]:
+    """Units of records by the SI unit that they are converted to."""
+    rows: dict[str, list[str]] = {}
+    for name, (unit, _) in UNITS.items():
+        rows.setdefault(unit, []).append(f"`{name}`")
+    return markdown_table(("SI unit", "units"), ((unit, ", ".join(names)) for unit, names in rows.items()))
 
 
 @table

@@ -17,6 +17,7 @@ from tests.shared import refusal, sized
 from tfarm.arm.writing import KeyedArms, numbers_of
 from tfarm.case import Case
 from tfarm.dsp import Chain, Converters, ReferenceShaping, Sampling, Simulator, Slew, scenario
+from tfarm.dsp.plant import undelayed_plant
 from tfarm.dsp.profiles import motion_of_slew
 from tfarm.dsp.scenarios import slew_scenario
 from tfarm.dsp.shaping import (
@@ -33,7 +34,9 @@ from tfarm.loop.sampled import sampled_loop
 from tfarm.references import reference
 from tfarm.references.bounds import SlewBounds
 from tfarm.references.shaped import certified_bound, with_frequencies
+from tfarm.response.signals import Signals
 from tfarm.spectrum.damped import damped_modes
+from tfarm.spectrum.enclosed import EnclosedArms
 
 LAB = tfarm.load("sasaki2012-lab")
 LAW = tfarm.HubFeedback(K1=0.5, K2=0.1, Kp=2.0)
@@ -294,6 +297,41 @@ def test_the_residual_of_a_shaped_slew_is_below_its_certified_bound(number):
         assert chain.sampling.period < 0.005 or ratios[-1] < 1.001
     assert np.median(ratios) < 5
     assert len(ratios) >= 0.75 * number
+
+
+def test_the_bound_has_the_poles_left_out_in_the_moment_and_in_what_the_controller_reads():
+    """A larger tail of the moment adds it times the largest torque; one of a fed back signal moves the torque too."""
+    law = replace(LAW, K2=0.0)
+    case = Case(LAB, law, shaped("none"))
+    task = scenario("slew", LAB, case.chain, 2.0, law)
+    bounds = SlewBounds(case, task)
+    keyed = KeyedArms(LAB, ())
+    own = bounds.bound(keyed, {}, None)
+    torque = abs(Simulator(case, task, count=20).run().torque).max()
+    for name in bounds.names:
+        tails = own.band.tails + 1e-7 * (np.array(bounds.names) == name)
+        more = bounds.bound(keyed, {}, own.band._replace(tails=tails)).most - own.most
+        # what the controller reads is off by that, the torque by its gain, and the moment by some of the torque
+        gain = {"root_moment": 1.0, "hub_rate": law.K1, "hub_angle": law.Kp}[name]
+        assert more > (1.0 if name == "root_moment" else 0.1) * 1e-7 * torque * gain
+
+
+def test_the_tail_is_above_the_sum_of_the_poles_left_of_its_line():
+    """Below the top: those of a model of 60 modes, under the input of size 1 that makes each signal largest."""
+    T = 0.002
+    names = ("hub_angle", "hub_rate", "root_moment")
+    plant = undelayed_plant(LAB, names, 60)
+    read = Signals(LAB, names)
+    for line, top in ((200.0, 5000.0), (1500.0, 12000.0)):
+        left = (plant.poles.real < -line) & (abs(plant.poles.imag) < top)
+        assert left.sum() >= 4
+        p = plant.poles[left]
+        shares = plant.residues[:, left] / p
+        # of the last input the share r/p is that at rest: the rest of it, and those before, at their worst signs
+        past = np.exp(np.outer(p, T * np.arange(1, 400)))
+        answers = np.c_[shares @ past[:, :1], (shares * np.expm1(p * T)) @ past].real
+        tail = EnclosedArms(LAB, (LAB,), read.outputs, read.places).tail(line, top, T, T)
+        assert (abs(answers).sum(axis=1) <= tail).all()
 
 
 @pytest.mark.parametrize("key", ["payload.mass", "hub.inertia"])

@@ -26,8 +26,12 @@ from tfarm.exported import export as export
 from tfarm.face import CaseFace
 from tfarm.fitting.data import Measured as Measured
 from tfarm.fitting.data import read_measured as read_measured
+from tfarm.fitting.experiment import experiment as experiment
 from tfarm.fitting.fit import fit as fit
 from tfarm.fitting.overlay import overlay as overlay
+from tfarm.fitting.prediction import predict as predict
+from tfarm.fitting.recording import read_recording as read_recording
+from tfarm.fitting.run_files import runs_of as runs_of
 from tfarm.fitting.together import fit_together as fit_together
 from tfarm.loop.locus import locus as locus
 from tfarm.loop.margins import margins as margins

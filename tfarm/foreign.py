@@ -1,4 +1,4 @@
-"""Binary files of other programs (.mat, UFF, Parquet), read by a process of its own with limits of time and memory.
+"""Binary files of other programs (.mat, HDF5, UFF, Parquet), read by a process with limits of time and memory.
 
 Their readers are not ours: on a file from outside one may end its process, loop or fill the memory.  Arrays come back
 through a pipe as .npy without pickle, rows of a Parquet file as CSV.
@@ -28,7 +28,7 @@ alarm: Callable[[int], object] = getattr(signal, "alarm", lambda _: None)
 
 @contextmanager
 def read_by_child(kind: str, path: str | os.PathLike[str], *, key: str, remedy: str) -> Iterator[IO[bytes]]:
-    """Yield the output of a process that reads a file of that kind: mat, uff or parquet.
+    """Yield the output of a process that reads a file of that kind: see `main`.
 
     Raises ParameterError, naming `key`, where it ends with an error, by a signal or at a limit.
     """
@@ -51,7 +51,7 @@ def read_by_child(kind: str, path: str | os.PathLike[str], *, key: str, remedy: 
 
 
 def read_arrays(kind: str, path: str | os.PathLike[str], *, key: str, remedy: str) -> dict[str, Any]:
-    """Return the arrays of a .mat or UFF file by their names.  Raises ParameterError as `read_by_child` does."""
+    """Return the arrays of a binary file by their names.  Raises ParameterError as `read_by_child` does."""
     with read_by_child(kind, path, key=key, remedy=remedy) as output:
         load = partial(np.load, io.BytesIO(output.read()), allow_pickle=False)
     return {str(name): load() for name in load()}
@@ -82,17 +82,72 @@ def _numbers(name: str, value: Any) -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
+def of_hdf5(path: str) -> Iterator[memoryview]:
+    """Return the numbers of an HDF5 file by their paths, "log/enc [deg]" by the attribute `unit` or `units`.
+
+    A field of a compound type is "log/table.enc".  What lies in other files is left out.
+    """
+    import h5py
+
+    found: dict[str, Any] = {}
+
+    def visit(name: str, each: Any) -> None:
+        if not isinstance(each, h5py.Dataset) or each.ndim not in (1, 2) or each.external or each.is_virtual:
+            return
+        if each.dtype.names:
+            found.update({f"{name}.{field}": each[field] for field in each.dtype.names})
+        else:
+            found[name + _unit_suffix(each.attrs.get("unit", each.attrs.get("units")))] = each[()]
+
+    with h5py.File(path, "r") as file:
+        file.visititems(visit)
+    return pack_arrays({name: value for name, value in found.items() if value.dtype.kind in "biuf"})
+
+
+def _unit_suffix(unit: Any) -> str:
+    """Return " [deg]" for a unit as text or bytes; nothing for anything else."""
+    if isinstance(unit, bytes):
+        unit = unit.decode("utf-8", "replace")
+    return f" [{unit}]" if isinstance(unit, str) and unit else ""
+
+
 def of_uff(path: str) -> Iterator[memoryview]:
     """Return frequencies and values of each frequency response function (data set 58, function 4) of a UFF file."""
+    found: dict[str, Any] = {}
+    # 18: the kind of an abscissa that is a frequency
+    for each in _uff_functions(path, function=4, abscissa=18):
+        found |= {f"x{len(found) // 2}": each["x"], f"data{len(found) // 2}": each["data"]}
+    return pack_arrays(found)
+
+
+def _uff_functions(path: str, *, function: int, abscissa: int) -> Iterator[Any]:
+    """Yield the data sets 58 of a UFF file of that function over that abscissa."""
     import pyuff
 
     file = pyuff.UFF(path)
-    found: dict[str, Any] = {}
     for n, kind in enumerate(file.get_set_types()):
         each = file.read_sets(n) if int(kind) == 58 else {}
-        # 18: the kind of an abscissa that is a frequency
-        if each.get("func_type") == 4 and each.get("abscissa_spec_data_type", 18) == 18:
-            found |= {f"x{len(found) // 2}": each["x"], f"data{len(found) // 2}": each["data"]}
+        if each.get("func_type") == function and each.get("abscissa_spec_data_type", abscissa) == abscissa:
+            yield each
+
+
+def of_uff_time(path: str) -> Iterator[memoryview]:
+    """Return times and values of each time response (data set 58, function 1) of a UFF file.
+
+    Its name is its first line of identification, else signal1, signal2, ... in the order of the file.
+    """
+    found: dict[str, Any] = {}
+    # 17: the kind of an abscissa that is a time
+    for each in _uff_functions(path, function=1, abscissa=17):
+        times = found.setdefault("t", each["x"])
+        if not np.array_equal(times, each["x"]):
+            raise ValueError(f"the times of its record {len(found)} are others than those of the first")
+        unit = each.get("ordinate_axis_units_lab", "").strip()
+        words = _unit_suffix("" if unit == "NONE" else unit)
+        name = each["id1"].strip()
+        if name in ("", "NONE") or f"{name}{words}" in found:
+            name = f"signal{len(found)}"
+        found[f"{name}{words}"] = each["data"]
     return pack_arrays(found)
 
 
@@ -106,13 +161,31 @@ def pack_arrays(found: dict[str, Any]) -> Iterator[memoryview]:
 
 def of_parquet(path: str) -> Iterator[bytes]:
     """Yield names and rows of a Parquet file as CSV, a batch at a time."""
-    from pyarrow.parquet import ParquetFile  # type: ignore[import-untyped]
+    from pyarrow.parquet import ParquetFile
 
     with ParquetFile(path) as file:
         yield _csv_lines([file.schema_arrow.names])
         for batch in file.iter_batches():
             columns = (column.to_pylist() for column in batch.columns)
             yield _csv_lines(zip(*columns, strict=True))
+
+
+def of_parquet_columns(path: str) -> Iterator[memoryview]:
+    """Return the columns of numbers of a Parquet file, nan where one is missing, by names and units of its fields."""
+    import pyarrow
+    from pyarrow.parquet import ParquetFile
+
+    # older ones unpickle what they read (CVE-2023-47248)
+    if tuple(map(int, pyarrow.__version__.split(".")[:3])) < (14, 0, 1):
+        raise ImportError("pyarrow 14.0.1 or newer is needed")
+    found: dict[str, Any] = {}
+    with ParquetFile(path) as file:
+        table = file.read()
+    for field, column in zip(table.schema, table.columns, strict=True):
+        if pyarrow.types.is_integer(field.type) or pyarrow.types.is_floating(field.type):
+            unit = (field.metadata or {}).get(b"unit")
+            found[field.name + _unit_suffix(unit)] = column.to_numpy()
+    return pack_arrays(found)
 
 
 def _csv_lines(rows: Iterable[Any]) -> bytes:
@@ -124,7 +197,14 @@ def _csv_lines(rows: Iterable[Any]) -> bytes:
 
 def main(kind: str, path: str) -> None:
     """Write the content of a file to standard output; the last line of an error is its reason."""
-    readers: dict[str, Callable[[str], Iterator[Any]]] = {"mat": of_mat, "uff": of_uff, "parquet": of_parquet}
+    readers: dict[str, Callable[[str], Iterator[Any]]] = {
+        "mat": of_mat,
+        "hdf5": of_hdf5,
+        "uff": of_uff,
+        "uff-time": of_uff_time,
+        "parquet": of_parquet,
+        "columns": of_parquet_columns,
+    }
     # of a system without limits, or with a tighter one
     with suppress(ImportError, ValueError, OSError):
         import resource

@@ -27,7 +27,7 @@ from tfarm.arm import (
 from tfarm.arm.chain import CHAIN_TABLES, chain_of_tables
 from tfarm.arm.law_tables import LawTable, SignalTable, WeightTable
 from tfarm.arm.schema import PART_TABLES, SHAPE_TABLES, ArmTable, LinkTable, arm_of_table, file_keys
-from tfarm.fitting.recording import RunTable
+from tfarm.fitting.run_files import RunTable
 
 RIG = """\
 name = "bench"

@@ -24,6 +24,7 @@ OF_AN_ARM = {
     "tune": "--trials 1",
     "compare": "sasaki2012-lab --modes 2",
     "study": "--over payload.mass=uniform:0,0.1 --ask modes --draws 2 --workers 1 --out OUT",
+    "experiment": "--free hub.inertia --duration 2 --limit 1 --outputs hub_angle --noise hub_angle=1e-3",
     "fit": "--mode 1=11hz --free link.youngs_modulus --covariance",
     "report": "--only modes --out OUT",
     "proof assumptions": "",

@@ -117,6 +117,23 @@ def test_what_does_not_matter_is_bounded_on_one_side():
     assert mass.deviation is None
 
 
+@pytest.mark.parametrize("profile", [False, True])
+def test_a_number_bounded_on_one_side_is_free_in_the_intervals_of_others(profile):
+    """The least sum over the masses has grown by the quantile squared where the inertia's interval ends."""
+    responses = [replace(each, omega=each.omega, sigma=20 * each.sigma) for each in measured()]
+    found = fit(LAB, responses, free=["payload.mass", "hub.inertia"], profile=profile)
+    mass, inertia = found.parameters
+    assert mass.deviation is None
+    assert mass.low == 0.0
+    masses = mass.high * np.r_[1e-3, np.linspace(0.04, 2.0, 50)]
+    for end in (inertia.low, inertia.high):
+        growth = min(chi_squared_at(found, {mass.key: each, inertia.key: end}) for each in masses)
+        growth -= found.chi_squared
+        # the covariance has no bound at a mass of 0
+        assert growth > 1.96**2 * 0.95
+        assert not profile or growth == pytest.approx(1.96**2, rel=0.05)
+
+
 def test_decays_alone():
     """Two frequencies and one ratio, of finite elements, for two numbers."""
     s = chain_elements.eigenvalues(LAB, 400.0)

@@ -1,12 +1,12 @@
-"""Measured responses and records from files: the same however a laboratory writes them, and one line for bad ones."""
+"""Measured responses from files: the same however a laboratory writes them, and one line for bad ones."""
 
 import hashlib
 import sys
 
 import numpy as np
 import pytest
-import scipy.io
 
+from tests.fitting.uff import data_set as uff
 from tests.shared import refusal
 from tfarm.errors import ParameterError
 from tfarm.fitting.data import data_of, read_measured
@@ -114,16 +114,6 @@ def test_a_wrong_option_is_refused(options, message):
     assert message in str(refusal(data_of, options))
 
 
-def uff(values, start, step, function=4):
-    """A data set 58 by the format's own table: complex, double precision, even spacing (4E20.12)."""
-    flat = [f"{x:20.12E}" for value in values for x in (value.real, value.imag)]
-    body = ["".join(flat[i : i + 4]) for i in range(0, len(flat), 4)]
-    place = f"{function:5d}{0:10d}{0:5d}{0:10d} {'NONE':10s}{1:10d}{3:4d} {'NONE':10s}{2:10d}{3:4d}"
-    form = f"{6:10d}{len(values):10d}{1:10d}{start:13.5E}{step:13.5E}{0.0:13.5E}"
-    axes = [f"{kind:10d}{0:5d}{0:5d}{0:5d} {'NONE':20s} {'NONE':20s}" for kind in (18, 12, 13, 0)]
-    return "\n".join(["    -1", "    58", *["NONE"] * 5, place, form, *axes, *body, "    -1", ""])
-
-
 def test_a_uff_file_is_read_and_its_responses_are_chosen_by_number(tmp_path):
     path = tmp_path / "sweep.uff"
     path.write_text(uff(VALUES, 0.0, 0.5))
@@ -174,63 +164,3 @@ def test_whatever_is_in_a_file_it_is_read_or_refused_in_one_line(tmp_path):
                 refusals.append(str(error))
     assert found > 10
     assert not any("\n" in each for each in refusals)
-
-
-T = 0.002 * np.arange(50) + 1.0
-X, Y = np.sin(T), np.cos(T)
-
-
-def written(path, names, *columns):
-    rows = (",".join(f"{x:.17g}" for x in row) for row in zip(*columns, strict=True))
-    path.write_text("\n".join([",".join(names), *rows]))
-    return path
-
-
-def test_csv_and_mat_hold_the_same_record(tmp_path):
-    text = written(tmp_path / "a.csv", ("torque", "t [s]", "acc [m/s^2]"), X, T, Y)
-    scipy.io.savemat(
-        tmp_path / "a.mat", {"time": T, "torque": X[:, None], "both": np.c_[X, Y], "rate": 500, "name": "a"}
-    )
-    one, other = read_recording(text), read_recording(tmp_path / "a.mat")
-    assert (list(one.signals), list(other.signals)) == (["torque", "acc"], ["torque", "both.1", "both.2"])
-    for found, name in ((one, "acc"), (other, "both.2")):
-        assert found.signal(name, "--signal").tolist() == Y.tolist()
-        assert found.times == pytest.approx(T, rel=4e-16)
-        assert (found.period, found.note) == (pytest.approx(0.002, rel=1e-13), "")
-
-
-def test_times_in_few_digits_are_even_and_uneven_sampling_is_noted(tmp_path):
-    rounded = read_recording(written(tmp_path / "a.csv", ("t", "x"), np.round(T / 3, 6), X))
-    assert rounded.note == ""
-    wandering = T + 5e-5 * np.sin(40 * T)
-    found = read_recording(written(tmp_path / "b.csv", ("t", "x"), wandering, X))
-    assert found.note.startswith("sampled unevenly, by up to")
-
-
-BAD_RECORDS = {
-    "none": (("x", "y"), (X, Y), "t is missing: a record has a column t, in seconds; this one has x, y"),
-    "alone": (("t",), (T,), "signals is missing"),
-    "dropped": (("t", "x"), (np.delete(T, 20), np.delete(X, 20)), "t of sample 21"),
-    "doubled": (("t", "x"), (np.insert(T, 20, T[20]), np.insert(X, 20, 0)), "t of sample 22"),
-    "short": (("t", "x"), (T[:7], X[:7]), "samples = 7"),
-    "milliseconds": (("t [ms]", "x"), (T, X), "unit of t = 'ms': times are in seconds"),
-    "huge": (("t", "x"), (T, np.where(T > 1.05, 1e300, X)), "x, sample 27 = 1e+300: no finite number up to 1e+70"),
-    "long": (("t", "x"), (np.where(T > 1.05, 1e300, T), X), "t, sample 27 = 1e+300: no finite number up to 1e+70"),
-    "instant": (("t", "x"), (5e-324 * np.arange(50), X), "period of t = 5e-324: times are in seconds"),
-}
-
-
-@pytest.mark.parametrize("what", BAD_RECORDS)
-def test_a_record_that_is_none_is_one_line_with_the_file(what, tmp_path):
-    names, columns, message = BAD_RECORDS[what]
-    path = written(tmp_path / "bad.csv", names, *columns)
-    assert str(refusal(read_recording, path)).startswith(f"{path}: {message}")
-
-
-def test_mat_files_that_are_none_are_one_line(tmp_path):
-    path = tmp_path / "bad.mat"
-    path.write_bytes(b"MATLAB 7.3 MAT-file")
-    assert "no .mat file that can be read" in str(refusal(read_recording, path))
-    scipy.io.savemat(path, {"t": T, "x": np.where(T > 1.05, np.nan, X)})
-    assert "x, sample 27 = nan: no finite number" in str(refusal(read_recording, path))
-    assert "record = '/nowhere" in str(refusal(read_recording, "/nowhere/a.mat"))

@@ -9,7 +9,8 @@ from scipy import signal
 from tests.shared import refusal
 from tests.shell import answer, refused, run
 from tfarm.fitting.data import data_of
-from tfarm.fitting.recording import Recording, frequency_response, independent_averages
+from tfarm.fitting.recording import Recording
+from tfarm.fitting.spectra import frequency_response, independent_averages
 
 T = 0.01
 B, A = [0.0, 0.5, 0.2], [1.0, -0.8, 0.4]  # rings for some ten samples: segments of a hundred leave little of it out
@@ -20,8 +21,8 @@ def recorded(x, y, period=T):
     return Recording(signals=signals, start=0.0, period=period, jitter=0.0, source="made", digest="")
 
 
-def estimate(x, y, **options):
-    return frequency_response(recorded(x, y), "tip_acceleration", "hub_torque", **options)
+def estimate(x, y, output="tip_acceleration", **options):
+    return frequency_response(recorded(x, y), output, "hub_torque", **options)
 
 
 def truth(omega):
@@ -95,7 +96,7 @@ def test_noise_on_the_input_lowers_h1_and_not_h2():
         ({"overlap": 1.0}, "--overlap = 1.0"),
         ({"estimator": "H3"}, "--estimator = 'H3'"),
         ({"window": "han"}, 'did you mean "hann"'),
-        ({"columns": ("acc", "hub_torque")}, "--output = 'acc'"),
+        ({"output": "root_moment"}, "--output = 'root_moment': known are: hub_torque, tip_acceleration"),
         ({"x": np.zeros(1000)}, "'hub_torque': does not move"),
         ({"y": np.zeros(1000)}, "'tip_acc"),
     ],

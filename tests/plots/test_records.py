@@ -23,7 +23,6 @@ READERS = {
     "tfarm.dsp.traces.tip_deviation",
     "tfarm.exact.outputs.signal_words",
     "tfarm.exact.outputs.unit_over",
-    "tfarm.fitting.recording.overshoot",
     "tfarm.loop.branches.origin_name",
     "tfarm.loop.curve.decibels",
     "tfarm.loop.curve.gain_margin",

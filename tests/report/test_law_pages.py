@@ -21,14 +21,17 @@ from tfarm.arm.law_tables import load_law
 from tfarm.assessment.card import margins_of
 from tfarm.case import Case
 from tfarm.dsp import Chain, Simulator, load_chain
+from tfarm.dsp.scenarios import Scenario
 from tfarm.errors import one_line
-from tfarm.fitting.recording import compare_run, load_run, overshoot
+from tfarm.fitting.prediction import overshoot
+from tfarm.fitting.run_files import load_run
 from tfarm.loop.sampled import sampled_loop
 from tfarm.report import writing
 from tfarm.report.arm_file import file_of
 from tfarm.report.loop_section import law_section, margins_section
+from tfarm.report.measured_section import measured_runs_section
 from tfarm.report.page import ArmReport, GivenLaw
-from tfarm.report.sampled_section import sampled_section, step_rows
+from tfarm.report.sampled_section import sampled_section
 from tfarm.report.sections import pieces_of
 from tfarm.schema import to_json
 
@@ -180,67 +183,103 @@ def real(name):
 
 
 @pytest.mark.parametrize("name", ["lqg", "hinf"])
-def test_a_step_over_the_measured_one_is_that_of_python_control(name):
-    """The sampled plant and the controller's matrices closed by hand, driven by the recorded reference."""
+def test_a_prediction_is_that_of_python_control(name):
+    """The sampled plant and the controller's matrices closed by hand, from the first angle, sensors off by offsets."""
     law, measured = real(name)
-    mine = compare_run(Case(PRESET, law, Chain()), measured)
+    mine = tfarm.predict(PRESET, measured.run, Chain())
     count = 8
-    led = measured.scenario(0.01).hub_angle
-    np.testing.assert_allclose(led, measured.reference - measured.reference[0], atol=1e-15)  # every row is a sample
+    start = measured.run.outputs["hub_angle"][0]
+    led = measured.run.references["hub_angle"] - start
+    off = np.array([mine.offsets["hub_angle"] - start, mine.offsets["root_moment"]])
     A, B, C, D = law.matrices((*law.signals, *law.wanted))
     plant = sampled_loop(Case(PRESET, law, Chain()), count=count).pulse.state_space()
+    t = np.arange(led.size) * 0.01
+    driving = np.vstack([np.outer(off, np.ones(t.size)), led])
+    given = control.forced_response(control.ss(A, -B, C, -D, 0.01), t, driving)
     closed = control.feedback(plant, control.ss(A, B[:, :2], C, D[:, :2], 0.01))
-    given = control.forced_response(control.ss(A, -B[:, 2:], C, -D[:, 2:], 0.01), np.arange(led.size) * 0.01, led)
-    found = control.forced_response(closed, np.arange(led.size) * 0.01, given.outputs).outputs[0]
-    assert abs(mine.run.at_samples.hub_angle - found).max() < 1e-3 * abs(led).max()  # modes beyond the eighth
+    found = control.forced_response(closed, t, given.outputs).outputs[0] + off[0] + start
+    assert abs(mine.predicted[0] - found).max() < 1e-3 * abs(led).max()  # modes beyond the eighth
 
 
-def test_what_is_measured_and_computed_of_the_real_controllers():
+def test_what_is_measured_and_predicted_of_the_real_controllers():
     chain = load_chain(DATA / "chain.toml")
     for name, (over, end) in {"lqg": (0.40895, 0.04873), "hinf": (4.84993, 0.48027)}.items():  # all of theta11
-        law, measured = real(name)
-        found = compare_run(Case(PRESET, law, chain), measured)
-        assert np.degrees(measured.step) == pytest.approx(30.0, abs=1e-5)
-        goal = measured.reference[-1]
-        assert 100 * overshoot(measured.hub_angle, measured.step, goal) == pytest.approx(over, abs=1e-3)
-        assert np.degrees(measured.hub_angle[-1] - goal) == pytest.approx(end, abs=1e-4)
-        on_rig, computed = step_rows(name, found)
-        assert on_rig.overshoot == pytest.approx(over, abs=1e-3)
-        assert computed.end == pytest.approx(np.degrees(found.hub_angle[-1] - goal))
-        first = [
-            np.flatnonzero(abs(moment) > 0.5)[0] for moment in (measured.root_moment, found.run.at_samples.root_moment)
-        ]
-        assert measured.root_moment[first[0]] < 0  # the tip lags behind first, there and here
-        assert found.run.at_samples.root_moment[first[1]] < 0
+        measured = real(name)[1].run
+        found = tfarm.predict(PRESET, measured, chain)
+        reference = measured.references["hub_angle"]
+        goal = reference[-1]
+        step = goal - reference[0]
+        angle = measured.outputs["hub_angle"]
+        assert np.degrees(step) == pytest.approx(30.0, abs=1e-5)
+        assert 100 * overshoot(angle, step, goal) == pytest.approx(over, abs=1e-3)
+        assert np.degrees(angle[-1] - goal) == pytest.approx(end, abs=1e-4)
+        on_rig, computed = (row for row in found.rows[:2])
+        assert (on_rig.origin, computed.origin) == ("measured", "predicted")
+        assert 100 * on_rig.overshoot == pytest.approx(over, abs=1e-3)
+        assert computed.rms == pytest.approx(np.sqrt(np.mean((found.predicted[0] - angle) ** 2)))
+        for moment in (found.measured[1], found.predicted[1]):
+            assert moment[np.flatnonzero(abs(moment) > 0.5)[0]] < 0  # the tip lags behind first, there and here
+        # dry friction: without it the prediction is not that of the rig, and the page says so
+        assert found.residuals[0].white < 1e-9
+        assert found.causes[0].removed > 1 / 3
 
 
 def test_a_measured_run_is_put_in_the_place_of_the_slew():
     laws = tuple(GivenLaw(*_with_run(name)) for name in ("lqg", "hinf"))
-    section = sampled_section(ArmReport(tfarm.load(DATA / "rig.toml"), load_chain(DATA / "rig.toml"), laws))
-    blocks = blocks_of(section)
-    assert list(blocks) == [
-        "sampled", "sampled-delays", "sampled-modes-law-1", "sampled-modes-law-2", "sampled-measured",
-        "sampled-overshoot",
-    ]  # fmt: skip
+    report = ArmReport(tfarm.load(DATA / "rig.toml"), load_chain(DATA / "rig.toml"), laws)
+    section = sampled_section(report)
+    assert list(blocks_of(section)) == ["sampled", "sampled-delays", "sampled-modes-law-1", "sampled-modes-law-2"]
     shown = table(section, "sampled-delays")
     assert shown["verdict"] == ["unstable"] * 3 + ["stable"] * 3
     assert shown["further_delay_ms"] == [0.0, 5.0, 10.0] * 2
     assert not section.facts
-    assert "MIT" in blocks["sampled-measured"].caption
     grows, shows, ends = (float(x) for x in re.findall(r"([\d.]+) s[.;,]", section.words[0]))
     assert _growth(*real("lqg"), ends) == (pytest.approx(grows, rel=0.005), pytest.approx(shows, rel=0.05))
+    runs = measured_runs_section(report)
+    blocks = blocks_of(runs)
+    assert [stem for stem in blocks if "law-2" in stem] == [
+        "measured-law-2", "measured-residuals-law-2", "measured-causes-law-2",
+    ]  # fmt: skip
+    assert "MIT" in blocks["measured-runs"].caption
+    assert "unstable" in runs.answer
+    assert "no posterior" in runs.words[1]
+    mine = tfarm.predict(report.arm, real("hinf")[1].run, report.chain)
+    assert table(runs, "measured-law-2")["rms"] == [row.rms for row in mine.rows]
 
 
 def _growth(law, measured, ends):
     """Growth [s] by the eigenvalues, and the time [s] at which the hub angle leaves its end, of 24 modes."""
     arm, chain = tfarm.load(DATA / "rig.toml"), load_chain(DATA / "rig.toml")
-    t, reference = np.append(measured.t, 32.0), np.append(measured.reference, measured.reference[-1])
-    task = replace(measured, t=t, reference=reference).scenario(0.01)
+    reference = measured.run.references["hub_angle"]
+    led = np.append(reference, np.full(2800, reference[-1])) - reference[0]
     case = Case(arm, law, chain)
-    run = Simulator(case, task, count=24).run().at_samples
+    none = 0 * led
+    run = Simulator(case, Scenario("measured", 0.01, none, led, none, none, none), count=24).run().at_samples
     radius = abs(sampled_loop(case, count=24).eigenvalues).max()
-    away = abs(run.hub_angle - run.hub_angle[run.t < ends][-1]) > 0.05 * abs(measured.step)
+    away = abs(run.hub_angle - run.hub_angle[run.t < ends][-1]) > 0.05 * abs(led[-1])
     return 0.01 / np.log(radius), run.t[away & (run.t > ends)][0]
+
+
+def test_a_posterior_and_the_arm_before_the_fit_are_named_with_the_run(tmp_path):
+    for name in ("hinf.toml", "hinf_step_20deg.csv", "orr_controllers.mat"):
+        (tmp_path / name).write_bytes((DATA / name).read_bytes())
+    (tmp_path / "before.toml").write_bytes((DATA / "rig.toml").read_bytes())
+    number = {"key": "hub.friction", "value": 4.0, "low": 3.8, "high": 4.2, "size": 0.0}
+    posterior = {
+        "format": "tfarm posterior 1", "arm": "rig", "numbers": [number], "covariance": [[6e-4]], "not_determined": [],
+    }  # fmt: skip
+    (tmp_path / "rig.posterior.json").write_text(json.dumps(posterior))
+    law = tmp_path / "hinf.toml"
+    text = law.read_text(encoding="utf-8")
+    law.write_text(f'{text}posterior = "rig.posterior.json"\nbefore = "before.toml"\n', encoding="utf-8")
+    given = GivenLaw(load_law(law), "hinf.toml", load_run(law))
+    section = measured_runs_section(ArmReport(tfarm.load(DATA / "rig.toml"), load_chain(DATA / "rig.toml"), (given,)))
+    assert "hub.friction = 4.000 (3.800 to 4.200), by the posterior of a fit" in section.words[1]
+    assert "before the fit" in table(section, "measured-law")["origin"]
+    assert "band of 95 %" in blocks_of(section)["measured-runs"].caption
+    law.write_text(f'{text}posterior = "none.json"\n', encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"none\.json"):
+        load_run(law)
 
 
 def _with_run(name):

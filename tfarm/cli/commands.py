@@ -1,6 +1,7 @@
 """The commands on an arm and on measured data.  Packages are imported inside them: `tfarm --help` needs none."""
 
 import math
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, cast
@@ -15,6 +16,7 @@ from tfarm.cli.options import (
     File,
     InputName,
     Png,
+    SignalTexts,
     TheoryName,
     chain_of_options,
     interval,
@@ -23,7 +25,10 @@ from tfarm.cli.options import (
     name_and,
     numbers,
     outputs_on,
+    read_arm,
+    record_of_options,
     refuse,
+    runs_of_options,
 )
 from tfarm.cli.output import emit, emit_loop, emit_record
 from tfarm.cli.progress import advance, print_line
@@ -34,7 +39,10 @@ measuring_command = partial(add_command, "Measure")
 RecordName = Annotated[
     Path,
     typer.Argument(
-        metavar="RECORD", exists=True, help="CSV or .mat file: t [s] and signals", show_default=False
+        metavar="RECORD",
+        exists=True,
+        help="CSV, .mat, HDF5, Parquet or UFF file: t [s] and signals",
+        show_default=False,
     ),
 ]
 pair = name_and(numbers("KEY=NUMBER,NUMBER", 2))
@@ -283,7 +291,10 @@ def fit(
     bounds: Annotated[list[Any] | None, typer.Option(metavar="KEY=LO,HI", parser=pair)] = None,
     prior: Annotated[list[Any] | None, typer.Option(metavar="KEY=MEAN,STD", parser=pair)] = None,
     mode: Annotated[list[str] | None, typer.Option(metavar="N=HZ,RATIO")] = None,
+    initial: Annotated[str | None, typer.Option(metavar="rest|free")] = None,
     covariance: bool = False,
+    read: Any = runs_of_options,
+    chain: Any = chain_of_options,
     save: File = None,
     png: Png = None,
     report: bool = False,
@@ -291,19 +302,21 @@ def fit(
     theory: TheoryName = None,
     show: Any = emit_record,
 ) -> None:
-    """Fit of an arm's numbers to measured responses and ring-downs.
+    """Fit of an arm's numbers to measured responses, runs over time and ring-downs.
 
-    Each number has its confidence interval.
+    Each number has its confidence interval.  The runs are those of the exact sampled plant, through the chain of the
+    arm's file or of --dsp.
 
     Options:
     data: measured response; may be repeated
-    free: free numbers: keys of the arm's file, such as link.youngs_modulus, and gain, delay of each sensor
+    free: keys of the arm's file, such as link.youngs_modulus; gain, delay; of runs drive.gain, drive.delay, gain:SIGNAL
     start: first value, if not the arm's
     bounds: bounds of a number
     prior: prior mean and deviation
     mode: mode of a ring-down: 1=2.52hz,0.006, with standard deviations 1=2.52hz~0.01,0.006~0.001
+    initial: motion of the runs at their first sample; by default free in open loop, rest under a controller
     covariance: intervals by the covariance alone, without profiles
-    save: write the fitted arm to this TOML file
+    save: write the fitted arm to this TOML file, with the chain of its runs
     report: write the pages of the fitted arm
     out: the folder of the pages
     """
@@ -313,13 +326,18 @@ def fit(
 
     subject = load_arm(arm, theory)
     measured = [data_of(text) for text in data or []]
+    runs = [replace(each, initial=cast("Any", initial)) for each in read(subject)]
     page = None
+    if not runs:
+        refuse({"initial": initial, **chain.keywords}, "is of runs: give --run too")
     for each in measured:
         ratio.check_unit(subject, each)
     found = tfarm.fit(
         subject,
         measured,
         [key.strip() for key in free.split(",") if key.strip()],
+        runs=runs,
+        chain=chain(arm),
         rings=[model.mode_of(text) for text in mode or []],
         profile=not covariance,
         progress=advance,
@@ -338,6 +356,55 @@ def fit(
         raise typer.Exit(3)
 
 
+@measuring_command(epilog="predict rig.toml --run record.csv=law.toml --posterior rig.posterior.json")
+def predict(
+    *,
+    arm: ArmName,
+    runs: Any = runs_of_options,
+    posterior: File = None,
+    before: Annotated[str | None, typer.Option(metavar="ARM")] = None,
+    without: Annotated[
+        list[Any] | None, typer.Option(metavar="KEY=VALUE", parser=name_and(numbers("KEY=NUMBER", 1)))
+    ] = None,
+    gain: Annotated[
+        list[Any] | None, typer.Option(metavar="SIGNAL=VALUE", parser=name_and(numbers("SIGNAL=NUMBER", 1)))
+    ] = None,
+    draws: Annotated[int, typer.Option(min=2, max=1000)] = 20,
+    theory: TheoryName = None,
+    chain: Any = chain_of_options,
+    show: Any = emit,
+) -> None:
+    """Prediction of a run that no fit has used, with null models.
+
+    A prediction counts for a signal where it beats them all.
+
+    Options:
+    posterior: of the fit, for the band of the prediction
+    before: preset or file of the arm before the fit, a null model
+    without: number of the fit as it is without it, a null model; such as drive.gain=1 or drive.delay=0
+    gain: gain of a sensor, as a fit has it: root_moment=1.02
+    draws: number of arms drawn from the posterior
+    """
+    from tfarm.fitting.posterior import load_posterior
+
+    subject = load_arm(arm, theory)
+    found = runs(subject)
+    require(len(found) == 1, "--run", len(found), "give one run, which no fit has used")
+    earlier = None if before is None else read_arm(before)
+    answer = tfarm.predict(
+        subject,
+        found[0],
+        chain(arm),
+        before=None if earlier is None else load_arm(earlier, theory),
+        before_chain=None if earlier is None else chain(earlier),
+        posterior=None if posterior is None else load_posterior(posterior),
+        without={key: value for key, (value,) in without or []},
+        gains={key: value for key, (value,) in gain or []},
+        draws=draws,
+    )
+    show(answer)
+
+
 @measuring_command(
     epilog="frf record.csv --input hub_torque --output tip_acceleration=acc1 --save measured.csv"
 )
@@ -350,6 +417,9 @@ def frf(
     window: str = "hann",
     segment: float | None = None,
     overlap: float | None = None,
+    held: bool = False,
+    signal: SignalTexts = None,
+    read: Any = record_of_options,
     csv: Annotated[Path | None, typer.Option("--save", "--csv", metavar="FILE")] = None,
     show: Any = emit_record,
 ) -> None:
@@ -358,45 +428,48 @@ def frf(
     The estimate is that of averaged cross-spectra.
 
     Options:
-    input: such as hub_torque; or hub_torque=COLUMN of the record
+    input: such as hub_torque; or hub_torque=COLUMN of the record, as of --signal
     output: such as tip_acceleration; or tip_acceleration=COLUMN
     estimator: H1 (noise on the output), H2 (on the input) or Hv
     window: hann for random excitation, boxcar for whole sweeps
     segment: length of a segment [s]; by default an eighth of the record
     overlap: share of a segment; by default 0.5, or 0 with boxcar
+    held: the input is held from each sample to the next, as by a DAC; not of a decimated record
     csv: write the response, for --measured and --data
     """
-    from tfarm.fitting import recording
+    from tfarm.fitting.signals import signal_of
+    from tfarm.fitting.spectra import frequency_response
 
+    if held and (by := read.keywords["decimate"]) > 1:
+        refuse({"decimate": by}, "a filtered input is held no longer; leave --held out")
+    signals = [signal_of(text) for text in signal or []]
     names = []
-    columns = []
-    for text in (output, input):
-        name, sign, column = text.partition("=")
-        require(column or not sign, "signal", text, "write NAME=COLUMN, such as tip_acceleration=acc1")
-        names.append(name)
-        columns.append(column or name)
-    found = recording.frequency_response(
-        recording.read_recording(record),
+    for key, text in (("--output", output), ("--input", input)):
+        own = signal_of(text, key)
+        names.append(own.name)
+        if text not in [each.name for each in signals]:
+            signals.append(own)
+    found = frequency_response(
+        read(record, signals),
         *names,
-        columns=cast("Any", columns),
-        estimator=cast("Any", estimator),
-        window=cast("Any", window),
+        estimator=estimator,
+        window=window,
         segment=segment,
         overlap=overlap,
+        is_held=held,
     )
     emit(found, csv=csv, rows=True, show=show)
-    if found.note:
-        print_line(found.note)
 
 
 @measuring_command(epilog="ring record.csv --signal root_strain --from 2.5")
 def ring(
     *,
     record: RecordName,
-    signal: str,
+    signal: Annotated[list[str], typer.Option("--signal", metavar="NAME=COLUMN", show_default=False)],
     start: Annotated[float | None, typer.Option("--from")] = None,
     stop: Annotated[float | None, typer.Option("--to")] = None,
     modes: Annotated[int, typer.Option(min=1)] = 1,
+    read: Any = record_of_options,
     show: Any = emit_record,
 ) -> None:
     """Frequencies and damping ratios of a decay.
@@ -404,11 +477,15 @@ def ring(
     Each has its confidence interval.
 
     Options:
-    signal: column of the record that decays
+    signal: column of the record that decays, as of frf: root_strain, root_strain=gauge*2e-6; and t=COLUMN
     start: time [s] at which the excitation ends
     stop: last time [s]
     modes: number of oscillations
     """
-    from tfarm.fitting import decays, recording
+    from tfarm.fitting import decays
+    from tfarm.fitting.signals import TIMES, signal_of
 
-    show(decays.fit_ringdown(recording.read_recording(record), signal, start=start, stop=stop, modes=modes))
+    signals = [signal_of(text) for text in signal]
+    names = [each.name for each in signals if each.name not in TIMES]
+    require(len(names) == 1, "--signal", names, "one signal decays, and the other one is t")
+    show(decays.fit_ringdown(read(record, signals), names[0], start=start, stop=stop, modes=modes))

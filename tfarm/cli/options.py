@@ -17,6 +17,9 @@ from tfarm.errors import require
 
 if TYPE_CHECKING:
     from tfarm.arm.chain import Chain
+    from tfarm.fitting.recording import Recording
+    from tfarm.fitting.runs import Run
+    from tfarm.fitting.signals import RecordSignal
 
 
 def preset_names(incomplete: str) -> list[str]:
@@ -305,6 +308,67 @@ def outputs_on(
     from tfarm.exact.outputs import on_side
 
     return [name if side is None else on_side(name, cast("Any", side)) for name in names], x
+
+
+SignalTexts = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--signal",
+        metavar="NAME=COLUMN",
+        help="column of a signal, with a unit, a scale or a standard deviation: hub_angle=enc[deg], "
+        "hub_angle=enc*0.00153, hub_angle=enc~1e-4, t=time[ms]; may be repeated, and others are not read then",
+    ),
+]
+
+
+def record_of_options(
+    path: Path,
+    signals: "Sequence[RecordSignal]",
+    *,
+    decimate: Annotated[
+        int, typer.Option("--decimate", min=1, help="keep one sample of this number, filtered first")
+    ] = 1,
+) -> "Recording":
+    """Return the record of a file, of these signals, or of all where there are none; decimated through a filter."""
+    from tfarm.fitting.recording import decimated, read_recording
+
+    remedy = "a standard deviation is for runs; leave it out"
+    for each in signals:
+        require(each.sigma is None, each.key, f"~{each.sigma}", remedy)
+    found = decimated(read_recording(path, signals), decimate)
+    if found.note:
+        print_line(found.note)
+    return found
+
+
+def runs_of_options(
+    arm: Arm,
+    *,
+    run: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--run",
+            metavar="FILE",
+            help="record of a rig in motion; FILE=LAW.toml under the controller that was running; may be repeated",
+        ),
+    ] = None,
+    signal: SignalTexts = None,
+    decimate: Annotated[
+        int,
+        typer.Option(
+            "--decimate", min=1, help="keep one sample of this number, over which the input is constant"
+        ),
+    ] = 1,
+) -> "list[Run]":
+    """Return the runs of an arm that --run names; none where it is not given."""
+    from tfarm.fitting.run_files import runs_of
+
+    if not run:
+        refuse(
+            {"signal": signal, "decimate": decimate if decimate > 1 else None},
+            "is of a record: give --run too",
+        )
+    return runs_of(run or [], arm, signal or [], decimate)
 
 
 def weight_entry(text: str) -> tuple[Any, ...]:

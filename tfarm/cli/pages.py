@@ -66,7 +66,7 @@ def report(
     measured: measured response; may be repeated
     paper: each figure as a PDF at the width of a paper's column too, which takes about a quarter longer
     """
-    from tfarm.fitting import data, recording
+    from tfarm.fitting import data, run_files
     from tfarm.report import page, sections, write
 
     if only is not None:
@@ -81,7 +81,7 @@ def report(
                 page.GivenLaw(
                     law_of_options(file, arm, gains(), each)[0],
                     Path(each.name).name,
-                    recording.load_run(each),
+                    run_files.load_run(each),
                 )
                 for each in others
             ]

@@ -13,7 +13,7 @@ from typing import Any
 import typer
 from typer.exceptions import TyperException
 
-from tfarm.cli import arm_files, commands, control, designing, pages  # noqa: F401  each adds its commands
+from tfarm.cli import arm_files, commands, control, designing, experiments, pages  # noqa: F401  each adds its commands
 from tfarm.cli.app import app
 from tfarm.cli.progress import discard, print_line, progress
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, require
@@ -21,11 +21,33 @@ from tfarm.files import STANDARD_OUTPUT
 
 # files that may be "-", standard output
 STREAMED = ("--csv", "--figure", "--png", "--mat", "--save")
-WRITTEN = (*STREAMED, "--animate")
+WRITTEN = (*STREAMED, "--animate", "--c")
 # such as 1_0
-PATHS = (*WRITTEN, "--out", "--tuned", "--dsp", "--law", "--controller", "--list", "--posterior")
+PATHS = (
+    *WRITTEN,
+    "--out",
+    "--tuned",
+    "--dsp",
+    "--law",
+    "--controller",
+    "--list",
+    "--posterior",
+    "--run",
+    "--before",
+)
 # NAME=VALUE, one a name
-BY_NAME = ("--range", "--weight", "--over", "--start", "--bounds", "--prior", "--vary")
+BY_NAME = (
+    "--range",
+    "--weight",
+    "--over",
+    "--start",
+    "--bounds",
+    "--prior",
+    "--vary",
+    "--noise",
+    "--without",
+    "--gain",
+)
 # of the help, in its order
 CHAPTERS = ("Arm", "Loop", "Design", "Measure", "Study", "Report")
 

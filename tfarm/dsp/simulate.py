@@ -290,7 +290,7 @@ class Simulator:
 
 @frozen
 class LinearLoop:
-    """A law in z round a plant, whose outputs begin with those `AT_HUB`, without steps, ranges and limits."""
+    """A law in z round a plant, whose outputs begin with those `AT_HUB`, through the converters of a chain."""
 
     plant: Plant
     law: Law
@@ -320,12 +320,12 @@ class LinearLoop:
         outputs = self.plant.outputs
         sources = np.array([outputs.index(name) if name in outputs else -1 for name in self.columns])
         electronics = kernel.Electronics(
-            quantisers=quantisers(Chain()),
+            quantisers=quantisers(chain),
             is_differenced=chain.converters.hub_rate == "difference",
             pole=math.exp(-chain.converters.rate_filter * sampling.period),
             period=float(sampling.period),
             delay=sampling.whole_delay,
-            is_single=False,
+            is_single=chain.converters.is_single,
             bound=math.inf,
         )
         state = kernel.rest(model, n, sampling.whole_delay)
@@ -335,7 +335,7 @@ class LinearLoop:
             kernel.Forcing(np.zeros(n), disturbance, 0.0),
             electronics,
             self._table,
-            np.array([-np.inf, np.inf]),
+            back_calculation(self.law, electronics.quantisers[kernel.DAC, 1:]),
             sources,
             references,
         )

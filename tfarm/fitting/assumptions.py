@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from tfarm.fitting.data import Measured
     from tfarm.fitting.intervals import Fitted
+    from tfarm.fitting.runs import Run
 
 
 def assumptions_of(
@@ -24,6 +25,7 @@ def assumptions_of(
     fitted: Sequence[Fitted],
     in_words: str,
     responses: Sequence[Measured],
+    runs: Sequence[Run],
     not_determined: Sequence[str],
 ) -> tuple[str, ...]:
     """Return an arm's assumptions, marked where they name a fitted number, then the fit and its data."""
@@ -44,6 +46,10 @@ def assumptions_of(
         texts.append(
             f"Fitted to {each.label} of {one_line(Path(each.source).name, longest_name)}, SHA-256 {digest}."
         )
+    for run in runs:
+        loop = "in open loop" if run.law is None else f"under {run.law.name}"
+        name = one_line(Path(run.source).name, longest_name)
+        texts.append(f"Fitted to a run of {name} {loop}, SHA-256 {run.digest or 'none'}.")
     return (*texts, *(f"Of the fit: {words}." for words in not_determined))
 
 

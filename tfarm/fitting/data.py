@@ -18,7 +18,8 @@ import hashlib
 import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
+from contextlib import suppress
 from importlib.util import find_spec
 from typing import Annotated, Any
 
@@ -53,7 +54,8 @@ class Measured:
 
     Both signals are named as in `response.signals` ("tip_acceleration", "strain@0.05"), `input` also as an arm's input
     is ("hub_torque").  `sigma` (n,) is the standard deviation of the real and of the imaginary part, each; `coherence`
-    (n,) between 0 and 1 is that of an estimate from a number of independent `averages`.  `source` names the file,
+    (n,) between 0 and 1 is that of an estimate from a number of independent `averages`.  The input was `held` over each
+    period [s] and the output sampled with it, or is continuous where that is None.  `source` names the file,
     `digest` is its SHA-256.
 
     Raises ParameterError for shapes that differ, frequencies that are not positive or do not ascend, values that are no
@@ -67,6 +69,10 @@ class Measured:
     sigma: Real | None = None
     coherence: Real | None = None
     averages: int | None = None
+    held: Annotated[
+        float | None,
+        Quantity(key="held_s", help="period [s] over which the input is held; none where it is not"),
+    ] = None
     source: Annotated[str, Quantity("file", help="file that the response was read from")] = "array"
     digest: Annotated[str, Quantity(key="sha256", help="SHA-256 of that file")] = ""
 
@@ -144,8 +150,9 @@ class Measured:
         ):
             if of is not None:
                 rows.append(Column(key, title, of=of, digits=singly(general, 6)))
-        if self.averages is not None:
-            rows.append(Column("averages", "averages", of=[self.averages] * self.points))
+        for key, value in (("averages", self.averages), ("held", self.held)):
+            if value is not None:
+                rows.append(Column(key, key, of=[value] * self.points))
         return Table(columns=tuple(rows))
 
 
@@ -259,8 +266,8 @@ class Sheet:
         require(not wrong[at], f"line {self.lines[at]}, {name}", float(self.columns[name][at]), remedy)
 
 
-def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
-    """Return the columns of a text file.
+def read_sheet(path: str | os.PathLike[str], key: str, wanted: Container[str] | None = None) -> Sheet:
+    """Return the columns of a text file, or the `wanted` ones: cells of the others may hold anything.
 
     Raises ParameterError naming the line for a missing or doubled name, a row of another length, or what is no finite
     number; naming `key` where the file cannot be read.
@@ -277,16 +284,16 @@ def read_sheet(path: str | os.PathLike[str], key: str) -> Sheet:
         separator = next((each for each in "\t;" if each in rows[0][1]), ",")
         units = _header(list(map(_cell, rows[0][1].split(separator))))
         require(len(rows) > 1, "rows", 0, "a header and nothing below it")
-        values = _numbers(list(units), rows[1:], separator)
+        values = _numbers(list(units), rows[1:], separator, wanted)
     lines = tuple(number for number, _ in rows[1:])
-    return Sheet(dict(zip(units, values.T, strict=True)), units, lines, hashlib.sha256(data).hexdigest())
+    return Sheet(values, units, lines, hashlib.sha256(data).hexdigest())
 
 
 def _header(cells: Sequence[str]) -> dict[str, str]:
     """Return the unit of each column by its name; a first line of numbers is a missing header."""
     units: dict[str, str] = {}
     for place, cell in enumerate(cells, start=1):
-        name, unit = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", cell, re.DOTALL).groups("")  # type: ignore[union-attr]
+        name, unit = name_and_unit(cell)
         require(
             math.isnan(_number(name)),
             "header",
@@ -296,28 +303,49 @@ def _header(cells: Sequence[str]) -> dict[str, str]:
         require(
             name and name not in units, f"header, column {place}", name, "each column has a name of its own"
         )
-        units[name] = unit.strip()
+        units[name] = unit
     return units
+
+
+def name_and_unit(text: str) -> tuple[str, str]:
+    """Return the name of a column and its unit, "" where there is none: "t [s]"."""
+    name, unit = re.fullmatch(r"(.*?)\s*(?:\[(.*)\])?", text, re.DOTALL).groups("")  # type: ignore[union-attr]
+    return name, unit.strip()
 
 
 def _cell(text: str) -> str:
     return text.strip().strip('"').strip()
 
 
-def _numbers(names: Sequence[str], rows: Sequence[tuple[int, str]], separator: str) -> Real:
-    """Return the cells (rows, columns) of numbered lines, by NumPy; the line of a row that is none is named."""
+def _numbers(
+    names: Sequence[str], rows: Sequence[tuple[int, str]], separator: str, wanted: Container[str] | None
+) -> dict[str, Real]:
+    """Return the wanted columns of numbered lines, by NumPy; the line of a cell that is no number is named."""
     for line, text in rows:
         if (count := text.count(separator) + 1) != len(names):
             raise ParameterError(
                 key=f"line {line}", value=text, remedy=f"{count} columns where the header names {len(names)}"
             )
+    chosen = [place for place, name in enumerate(names) if wanted is None or name in wanted]
+    if not chosen:
+        return {}
     lines = [text for _, text in rows]
-    values = np.loadtxt(lines, delimiter=separator, converters=_number, comments=None, ndmin=2)
+    # decimal commas
+    plain = lines if separator == "," else [text.replace(",", ".") for text in lines]
+    how: dict[str, Any] = {"delimiter": separator, "comments": None, "ndmin": 2, "usecols": chosen}
+    values = np.full((1, 1), math.nan)
+    # of quoted cells, and of what is no number
+    with suppress(ValueError):
+        values = np.loadtxt(plain, **how)
+    if not np.isfinite(values).all():
+        # ten times slower
+        values = np.loadtxt(lines, converters=_number, **how)
     for row, column in np.argwhere(np.isnan(values))[:1]:
         remedy = "no finite number; leave the row out, or write numbers as 50, 0.5 or 5e1"
-        cell = lines[row].split(separator)[column]
-        raise ParameterError(key=f"line {rows[row][0]}, {names[column]}", value=_cell(cell), remedy=remedy)
-    return values
+        place = chosen[column]
+        cell = lines[row].split(separator)[place]
+        raise ParameterError(key=f"line {rows[row][0]}, {names[place]}", value=_cell(cell), remedy=remedy)
+    return dict(zip((names[place] for place in chosen), values.T, strict=True))
 
 
 def _number(text: str) -> float:
@@ -362,11 +390,15 @@ def read_measured(path: str | os.PathLike[str], output: str, input: str) -> Meas
         if averages is not None:
             wrong = (averages != averages[0]) | (averages < 1) | (averages != np.round(averages))
             sheet.refuse("averages", wrong, "a whole number of averages, the same in every row")
+        held = sheet.columns.get("held")
+        if held is not None:
+            sheet.refuse("held", (held != held[0]) | (held <= 0), "a positive period, the same in every row")
         return Measured(
             output=output,
             input=input,
             omega=omega,
             values=values,
+            held=None if held is None else float(held[0]),
             sigma=sheet.columns.get("sigma"),
             coherence=sheet.columns.get("coherence"),
             averages=None if averages is None else int(averages[0]),
@@ -390,7 +422,7 @@ def _frequencies(sheet: Sheet) -> Real:
     """Return the frequencies [rad/s], once the header is known to be one and they ascend."""
     # its unit, and rad/s in one
     frequencies = {"hz": ("Hz", 2 * np.pi), "rad_s": ("rad/s", 1.0)}
-    known = (*frequencies, *VALUES, "coherence", "sigma", "averages")
+    known = (*frequencies, *VALUES, "coherence", "sigma", "averages", "held")
     for name in sheet.columns:
         require(name in known, "header", name, did_you_mean(name.lower(), known))
     found = [name for name in frequencies if name in sheet.columns]

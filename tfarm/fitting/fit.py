@@ -19,8 +19,8 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from tfarm.arm import Arm, must_be_arm
-from tfarm.arm.chain import Chain
-from tfarm.arm.writing import KeyedArms, to_toml
+from tfarm.arm.chain import Chain, file_text
+from tfarm.arm.writing import to_toml
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, require
 from tfarm.files import is_standard_output, write_file
@@ -38,12 +38,12 @@ from tfarm.fitting.model import (
 from tfarm.fitting.overlay import ResonanceShift, resonance_shifts
 from tfarm.fitting.posterior import SUFFIX, Posterior, Repeats, posterior_of, repeats
 from tfarm.fitting.ratio import ratio_of
+from tfarm.fitting.result_rows import FittedResponse, RunResults
 from tfarm.fitting.run_model import fit_run
 from tfarm.fitting.run_numbers import with_run_numbers
 from tfarm.fitting.runs import DRIVE_GAIN, GAIN_KEY, Run, commanded
 from tfarm.fitting.solve import (
     FIT_SEED,
-    Solution,
     best_solution,
     is_explained,
     nearest_minimum,
@@ -56,28 +56,8 @@ from tfarm.schema import Quantity
 from tfarm.stopping import Progress
 
 
-class FittedResponse(NamedTuple):
-    """A response of the fit."""
-
-    name: Annotated[str, Quantity(help="output/input as on the command line")]
-    label: Annotated[str, Quantity("response", key="response", help="output and input in words")]
-    unit: Annotated[str, Quantity("unit", help="SI unit of the response")]
-    source: Annotated[str, Quantity(help="file that the response was read from")]
-    sha256: Annotated[str, Quantity(help="SHA-256 of that file")]
-    frequencies: Annotated[int, Quantity("frequencies", help="number of measured frequencies")]
-    low: Annotated[float, Quantity("from", "Hz", key="from_hz", help="first measured frequency")]
-    high: Annotated[float, Quantity("to", "Hz", key="to_hz", help="last measured frequency")]
-    noise: Annotated[str, Quantity("noise by", help="origin of the standard deviation of its values")]
-    chi_squared: Annotated[
-        float,
-        Quantity(
-            "chi-squared", digits=4, help="its share of the sum of squared residuals over their deviations"
-        ),
-    ]
-
-
 @frozen(kw_only=True)
-class Fit(Solution):
+class Fit(RunResults):
     """The best point of the search with intervals: an arm fitted to measured responses.
 
     `parameters` are the free numbers with their intervals, `not_determined` the combinations that the data leave open;
@@ -103,18 +83,21 @@ class Fit(Solution):
         """The arm that the fit began with."""
         return self.before.name
 
-    def assumptions(self, family: KeyedArms) -> tuple[str, ...]:
+    def assumptions(self, number: int = 0) -> tuple[str, ...]:
         """Return the assumptions of one of its arms."""
-        return assumptions_of(family, self.parameters, self.in_words, self.responses, self.not_determined)
+        family = (self.problem.family, *self.problem.others)[number]
+        runs = [each.run for each in self.problem.runs if each.arm == number]
+        return assumptions_of(
+            family, self.parameters, self.in_words, self.responses, runs, self.not_determined
+        )
 
     @cached_property
     def arms(self) -> tuple[Arm, ...]:
         """All arms of the fit at the fitted numbers, the first as `arm`."""
         found = [self.arm]
-        pairs = zip(self.problem.others, self.problem.arms(self.point)[1:], strict=True)
-        for family, arm in pairs:
-            name = f"{arm.name}-fitted"
-            found.append(replace(arm, name=name, assumptions=self.assumptions(family)))
+        for number, arm in enumerate(self.problem.arms(self.point)[1:], start=1):
+            words = self.assumptions(number)
+            found.append(replace(arm, name=f"{arm.name}-fitted", assumptions=words))
         return tuple(found)
 
     @property
@@ -152,7 +135,7 @@ class Fit(Solution):
     ]:
         """A row a response."""
         rows = []
-        for one, residuals in zip(self.problem.responses, self.parts, strict=True):
+        for one, residuals in zip(self.problem.responses, self.parts, strict=False):
             of = one.data
             names = (of.name, of.label, of.unit, of.source, of.digest)
             chi_squared = float(residuals @ residuals)
@@ -274,6 +257,9 @@ class Fit(Solution):
         """Convergence, identified numbers, whether the model is rejected, and what is missed."""
         known = sum(each.identified for each in self.parameters)
         share = f"reduced chi-squared = {self.chi_squared / max(self.freedom, 1):.3g}"
+        if self.problem.runs and (self.is_explained or not self.has_known_noise):
+            white = "white" if self.is_explained else "not white"
+            share = f"residuals are {white} (chance {self.chance_of_white:.2g})"
         tests = {
             None: "noise estimated from the residuals: the model cannot be tested",
             True: f"model not rejected: {share}",
@@ -346,7 +332,9 @@ def fit_of(subject: Problem, profile: bool, progress: Progress | None) -> Fit:
             break
         except BetterError as better:
             (there,) = better.args
-            found = replace(nearest_minimum(there.problem, there.point), starts=found.starts)
+            pairs = zip(found.problem.parameters, there.problem.parameters, there.point.tolist(), strict=True)
+            point = np.array([own.coordinate(each.value(x)) for own, each, x in pairs])
+            found = replace(nearest_minimum(found.problem, point), starts=found.starts)
     else:
         # one valley after another: no end of it
         found = replace(found, converged=False)
@@ -359,7 +347,7 @@ def fit_of(subject: Problem, profile: bool, progress: Progress | None) -> Fit:
         not_determined=unknown,
         interval_by="profile likelihood" if profile else "covariance",
     )
-    return replace(fit, arm=replace(fit.arm, assumptions=fit.assumptions(subject.family)))
+    return replace(fit, arm=replace(fit.arm, assumptions=fit.assumptions()))
 
 
 def renamed(given: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -476,14 +464,14 @@ def stable_share(arms: Sequence[Arm], ranges: Sequence[tuple[float, float]]) -> 
 
 
 def save_fit(fit: Fit, path: Path) -> None:
-    """Write the fitted arm, and its posterior to a file of the same name; only the arm where that is a stream.
+    """Write the fitted arm with the chain of its runs, and its posterior to a file of the same name.
 
-    Other arms of the fit have files of their names beside it.
+    Only the arm where that is a stream.  Other arms of the fit have files of their names beside it.
     """
     files = [path, *(path.with_name(f"{each.name}{path.suffix}") for each in fit.arms[1:])]
     for file, arm in zip(files, fit.arms, strict=True):
         posterior = fit.posterior.of_arm(arm.name.removesuffix("-fitted"))
-        write_file(file, to_toml(arm).encode(), key="--save")
+        write_file(file, file_text(arm, fit.chain).encode(), key="--save")
         if file.is_file() and not is_standard_output(file) and posterior.numbers:
             content = f"{posterior.model_dump_json(indent=1)}\n".encode()
             write_file(file.with_name(f"{file.stem}{SUFFIX}"), content, key="--save")

@@ -6,6 +6,7 @@ the least sum of squares, with the number held, has grown by the square of the q
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -14,7 +15,15 @@ from scipy.optimize import brentq
 
 from tfarm.arm.schema import file_key
 from tfarm.arrays import Real
-from tfarm.fitting.solve import OPEN_DEVIATION, Solution, nearest_minimum, principal_axes, sum_of_squares
+from tfarm.fitting.model import Parameter
+from tfarm.fitting.solve import (
+    OPEN_DEVIATION,
+    Solution,
+    nearest_minimum,
+    open_axes,
+    principal_axes,
+    sum_of_squares,
+)
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.stopping import Progress
@@ -64,11 +73,14 @@ def confidence_intervals(
     """Return a solution's numbers with their intervals, and what is not determined, in words.
 
     The intervals are by profiles, or by the covariance where these are not asked for.
-    Along an open axis nothing changes, so one number of it is held while the others are profiled.  `progress` gets
+    Along an open axis nothing changes, so one number of it is held while the others are profiled.  A number that the
+    data bound on one side is free meanwhile, in another coordinate (`at_bounds`).  `progress` gets
     (done, total, key) before each.  Raises BetterError where a profile comes to a lower sum than the solution's.
     """
-    parameters = found.problem.parameters
     quantile = found.quantile
+    before = found.problem.parameters
+    found, bounds = at_bounds(found, quantile)
+    parameters = found.problem.parameters
     sizes, axes = principal_axes(found.jacobian)
     is_known = sizes >= 1.0 / OPEN_DEVIATION
     deviations = np.linalg.norm(axes[is_known] / sizes[is_known, None], axis=0).tolist()
@@ -78,8 +90,11 @@ def confidence_intervals(
     largest = abs(unknown).argmax(axis=1).tolist()
     held = {n: float(found.point[n]) for n in largest}
     keys = [each.key for each in parameters]
-    words = [describe_axis(axis, of, keys) for axis, of in zip(unknown, part, strict=True)]
-    alone = {n: k for k, n in enumerate(largest) if part[k].sum() == 1}
+    words = [
+        "" if of.sum() == 1 and n in bounds else describe_axis(axis, of, keys)
+        for axis, of, n in zip(unknown, part, largest, strict=True)
+    ]
+    lowest, highest = found.problem.bounds
     fitted = []
     for n, each in enumerate(parameters):
         if progress is not None:
@@ -89,15 +104,17 @@ def confidence_intervals(
         value = each.value(point)
         own = deviations[n]
         if not part[:, n].any():
-            ends = [point - quantile * own, point + quantile * own]
+            reach = quantile * own
+            ends = np.clip([point - reach, point + reach], lowest[n], highest[n]).tolist()
             if profile:
                 ends = [profile_end(found, n, end, quantile, held) for end in ends]
-            low, high = each.ends(ends)
-            deviation = own * (each.size or abs(value))
-        elif n in alone:
-            low, high = one_sided_interval(found, n, quantile)
-            if low is not None:
-                words[alone[n]] = ""
+            if n in bounds:
+                low, high = bounded_ends(before[n], each, ends, bounds[n])
+            else:
+                low, high = each.ends(ends)
+                deviation = own * (each.size or abs(value))
+        elif n in bounds:
+            low, high = bounds[n]
         of = file_key(each.key)
         fitted.append(
             Fitted(
@@ -109,13 +126,61 @@ def confidence_intervals(
                 high=high,
                 deviation=deviation,
                 identified=None not in (low, high),
-                start=each.start,
+                start=before[n].start,
             )
         )
         if (low is None) != (high is None):
             end = f"at most {high:.4g}" if low is None else f"at least {low:.4g}"
             words.append(f"{each.key} is {end}: one-sided bound")
     return tuple(fitted), tuple(word for word in words if word)
+
+
+def at_bounds(found: Solution, quantile: float) -> tuple[Solution, dict[int, tuple[float, float | None]]]:
+    """Return the solution with numbers that the data bound on one side alone in other coordinates, and their bounds.
+
+    The logarithm of a number without effect where it is has no end, and the intervals of others, with it held, are too
+    narrow.  The residuals are nearly linear in p itself where a larger one matters, and in 1/p where a smaller one
+    does: so that is its coordinate, over the bound.
+    """
+    unknown = open_axes(found.jacobian)
+    is_single = (abs(unknown) > 0.1).sum(axis=1) == 1
+    parameters = [*found.problem.parameters]
+    point = found.point.copy()
+    jacobian = found.jacobian.copy()
+    bounds: dict[int, tuple[float, float | None]] = {}
+    for n in abs(unknown[is_single]).argmax(axis=1).tolist():
+        low, high = one_sided_interval(found, n, quantile)
+        if low is None:
+            continue
+        bounds[n] = low, high
+        each = parameters[n]
+        value = each.value(point[n])
+        reach = [each.value(at) for at in each.bounds]
+        size = 1.0 / low if high is None else high
+        parameters[n] = replace(
+            each, start=value, low=reach[0], high=reach[1], size=size, is_inverse=high is None
+        )
+        jacobian[:, n] *= -value * size if high is None else size / value
+        point[n] = 0.0
+    problem = replace(found.problem, parameters=tuple(parameters))
+    return replace(found, problem=problem, point=point, jacobian=jacobian), bounds
+
+
+def bounded_ends(
+    before: Parameter, each: Parameter, ends: Sequence[float], alone: tuple[float, float | None]
+) -> tuple[float | None, float | None]:
+    """Return the interval of a number between two coordinates, and that with the others held, together.
+
+    Where it ends only as the search does, the number's own bound, or None, is its end.
+    """
+    low, high = sorted(map(each.value, ends))
+    # of a number: one so near to the reach of the search has ended there
+    near = 1e-6
+    lower = min(alone[0], low if low > each.low * (1 + near) else before.low)
+    upper = max(alone[1] or math.inf, high if high < each.high * (1 - near) else before.high)
+    if lower == 0 and math.isinf(upper):
+        return None, None
+    return lower, None if math.isinf(upper) else upper
 
 
 def one_sided_interval(found: Solution, n: int, quantile: float) -> tuple[float | None, float | None]:
@@ -125,7 +190,7 @@ def one_sided_interval(found: Solution, n: int, quantile: float) -> tuple[float 
     is neither.  The others are held: with them free the bound is farther by no more than a factor.
     """
     each = found.problem.parameters[n]
-    if each.size:
+    if each.size or each.start < 0:
         return None, None
     low, high = (each[n] for each in found.problem.bounds)
     own = found.point[n]
@@ -160,7 +225,8 @@ def profile_end(found: Solution, n: int, at: float, quantile: float, held: dict[
     # of the others where n is held elsewhere
     slope = np.eye(found.point.size)[n]
     slope[rest] = -np.linalg.lstsq(found.jacobian[:, rest], found.jacobian[:, n], rcond=None)[0]
-    own = near = found.point[n]
+    own = near = inside = found.point[n]
+    outside = math.inf if at > own else -math.inf
     root_near = 0.0
     # of a run's sum of squares: a part in 1,000 of what a deviation adds
     change = 1e-3 / found.chi_squared if found.problem.runs else 1e-9
@@ -185,7 +251,14 @@ def profile_end(found: Solution, n: int, at: float, quantile: float, held: dict[
             times = np.clip((quantile - root) / (root - root_near), -3, 3)
         near = at
         root_near = root
+        if root < quantile:
+            inside = at
+        else:
+            outside = at
         at = at + times * last
+        # a profile that is not monotonic ends between what is inside and what is outside
+        if not min(inside, outside) < at < max(inside, outside):
+            at = (inside + outside) / 2 if math.isfinite(outside) else 2 * inside - own
     return float(at)
 
 

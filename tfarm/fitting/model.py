@@ -30,6 +30,7 @@ from tfarm.exact.characteristic import characteristic
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.exact.system import system_of
 from tfarm.fitting.data import NUMBER, Measured, Noise, in_parts
+from tfarm.fitting.held import held_parts
 from tfarm.fitting.run_model import DRIVE_DELAY, FitRun
 from tfarm.records import frozen
 from tfarm.response.signals import Signals
@@ -42,7 +43,8 @@ from tfarm.spectrum.table import first_frequency
 class Parameter:
     """A free number: its key, where the search starts, its bounds, all in SI units, and a prior (mean, deviation).
 
-    The search is for (value - start)/size, or where the size is 0 for ln(value/start).
+    The search is for (value - start)/size, or where the size is 0 for ln(value/start); of one `is_inverse` for
+    (1/value - 1/start)/size.
     """
 
     key: str
@@ -51,17 +53,22 @@ class Parameter:
     high: float
     size: float = 0.0
     prior: tuple[float, float] | None = None
+    is_inverse: bool = False
     # times the start, or a part of it: beyond, a search has lost its way, or the data say nothing
     farthest: ClassVar[float] = 1e4
 
     def value(self, coordinate: float) -> float:
         """Return the number at a coordinate of the search, 0 at the start."""
+        if self.is_inverse:
+            return 1.0 / (1.0 / self.start + self.size * coordinate)
         if self.size:
             return self.start + self.size * coordinate
         return self.start * math.exp(coordinate)
 
     def coordinate(self, value: float) -> float:
         """Return the coordinate of a number."""
+        if self.is_inverse:
+            return (1.0 / value - 1.0 / self.start) / self.size
         if self.size:
             return (value - self.start) / self.size
         return math.log(value / self.start)
@@ -70,7 +77,8 @@ class Parameter:
     def bounds(self) -> tuple[float, float]:
         """Of the coordinate."""
         if self.size:
-            return self.coordinate(self.low), self.coordinate(self.high)
+            low, high = sorted((self.coordinate(self.low), self.coordinate(self.high)))
+            return low, high
         ends = (self.low / self.start, self.high / self.start)
         shares = np.clip(ends, 1 / self.farthest, self.farthest)
         return math.log(shares.min()), math.log(shares.max())
@@ -357,7 +365,14 @@ class Problem:
             delay = 0.0 if each.delay is None else self.value(point, each.delay)
             sensor = gain * np.exp(-1j * delay * each.data.omega)
             values, lacking = known[key]
-            found.append(Fraction(values[each.data.output] * sensor, values[each.data.input], lacking))
+            N = values[each.data.output]
+            D = values[each.data.input]
+            if each.data.held is not None:
+                s = (1j + share) * each.data.omega
+                under_drive = replace(arm, input=key[1])
+                hold, images = held_parts(under_drive, each.data.output, each.data.held, s)
+                N = N * hold + D * images
+            found.append(Fraction(N * sensor, D, lacking))
         return found
 
     def with_sensors(self, free: Sequence[str]) -> Problem:

@@ -129,6 +129,11 @@ def posterior_of(
     """Return the posterior of a solution, of the arm's own numbers among the fitted ones; `arm` is its name."""
     own = found.problem.of_the_arm
     J, of_sensors = np.split(found.jacobian, [len(own)], axis=1)
+    # what has no effect where it is, but would elsewhere, is marginalised, too
+    some = fitted[: len(own)]
+    is_bounded = np.array([each.deviation is None and each.low is not None for each in some], bool)
+    of_sensors = np.c_[of_sensors, J[:, is_bounded]]
+    J = np.where(is_bounded, 0.0, J)
     # residuals that no sensor explains
     sizes, axes = principal_axes(J - of_sensors @ (np.linalg.pinv(of_sensors) @ J))
     known = sizes >= 1.0 / OPEN_DEVIATION

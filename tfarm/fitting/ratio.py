@@ -19,6 +19,7 @@ from tfarm.arrays import Complex
 from tfarm.errors import ConvergenceError, ParameterError, require
 from tfarm.exact.outputs import unit_over
 from tfarm.fitting.data import Measured, check_signal, noise_of
+from tfarm.fitting.held import held_parts
 from tfarm.fitting.resonances import (
     PARTNERS_BEYOND,
     must_be_in_unit,
@@ -62,11 +63,15 @@ def upper_half(roots: Complex) -> Complex:
 
 @frozen
 class Ratio:
-    """The response `output`/`input` of an arm, exact.  Raises ParameterError for signals that the arm does not have."""
+    """The response `output`/`input` of an arm, exact; of samples where the input is `held` over that period [s].
+
+    Raises ParameterError for signals that the arm does not have.
+    """
 
     arm: Arm
     output: str
     input: str
+    held: float | None = None
 
     def __post_init__(self) -> None:
         check_signal(self.output, "output")
@@ -76,6 +81,8 @@ class Ratio:
             # a response that is not 0 throughout is not 0 at this s [1/s]
             is_moving = each is None or each(0.37 + 0.73j)
             require(is_moving, key, name, "does not move on this arm: it is held")
+        of_input = f"is of a commanded input, not of the signal {self.input}: leave it out"
+        require(self.held is None or self.is_driven, "held", self.held, of_input)
         remedy = "drives no locked hub; name what was measured: hub_angle where the angle drives it, or another signal"
         is_felt = not self.is_driven or not self.driven_arm.is_locked or self.input == "hub_angle"
         require(is_felt, "input", self.input, remedy)
@@ -110,7 +117,11 @@ class Ratio:
 
     def __call__(self, s: Any) -> Any:
         """Return H(s) at a complex scalar or array of s [1/s]."""
-        return self.above(s) if self.below is None else self.above(s) / self.below(s)
+        value = self.above(s) if self.below is None else self.above(s) / self.below(s)
+        if self.held is None:
+            return value
+        hold, images = held_parts(self.driven_arm, self.output, self.held, s)
+        return value * hold + images
 
     def roots(self, up_to: float) -> RatioRoots:
         """Return poles and zeros with |Im s| <= up_to [rad/s], as each transfer function has them, complete."""
@@ -167,7 +178,7 @@ def check_unit(arm: Arm, measured: Measured) -> None:
 def ratio_of(arm: Arm, measured: Measured) -> Ratio:
     """Return the exact response of what was measured; ParameterError, naming it, where the arm has no such response."""
     try:
-        return Ratio(arm, measured.output, measured.input)
+        return Ratio(arm, measured.output, measured.input, measured.held)
     except ParameterError as error:
         raise ParameterError(
             key=f"{measured.name} {error.key}", value=error.value, remedy=error.remedy, file=error.file

@@ -1,56 +1,19 @@
-"""Records over time: a column of times and named signals, from CSV or a .mat file.
+"""Records over time: a column of times and named signals, from CSV, .mat, HDF5, Parquet or UFF files.
 
-A run measured on a rig under a controller is compared with the exact sampled loop: [measured] of a law's file.
-
-    [measured]
-    file = "step.csv"                    # in the folder of the law's file
-    source = "laboratory X, run 7"       # shown with it
-
-The record (a .csv, or a .mat file) has a column `t` [s], one `reference:hub_angle` [rad], the reference of the
-controller, and one for each of `hub_angle` [rad] and `root_moment` [N m] that was measured.
-
-A frequency response of a record over time is one of averaged cross-spectra, with coherence and the number of averages.
-
-The record is cut into K segments of n samples, each begun S samples after the one before, less its mean, times a window
-w; their transforms X, Y give  S_xx = mean |X|^2,  S_xy = mean conj(X) Y,  S_yy = mean |Y|^2  (Welch 1967), and
-
-    H1 = S_xy/S_xx,    H2 = S_yy/conj(S_xy),    coherence  g^2 = |S_xy|^2/(S_xx S_yy).
-
-H1 is right where the noise is on the output, H2 where it is on the input; Hv, from the largest eigenvector of the
-matrix of the spectra, each scaled to the same noise, lies between them: |Hv|^2 = |H1| |H2|.  H1 is low by the factor
-1/(1 + N_xx/S_xx) where the input has noise N_xx.  Real and imaginary part each scatter by |H| sqrt((1 - g^2)/(2 N g^2))
-(Bendat and Piersol 2010, section 9.2), where N counts independent averages.  Overlapped segments are not: by Welch
-
-    N = K/(1 + 2 sum_j (1 - j/K) rho(j)),    rho(j) = (sum_i w_i w_{i + j S})^2/(sum_i w_i^2)^2.
-
-Random excitation wants a window that tapers ("hann"); a sine that is swept again and again wants segments as long as
-its sweep, "boxcar" and no overlap, and no window leaks.  A resonance narrower than 1/T of the segment is flattened.
+Nothing is resampled: what is unevenly sampled is refused, or noted where it is less than 10 % of a period.
 """
 
-import hashlib
-import math
 import os
-from dataclasses import replace
-from pathlib import Path
-from typing import Annotated, Any
+from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tfarm.arm.chain import TIME_ROUNDING
-from tfarm.arm.reading import AnyFile, load_tables
-from tfarm.arm.schema import StrictTable, validate_table
-from tfarm.arrays import Complex, Real
-from tfarm.case import Case
-from tfarm.dsp.results import simulate_modes
-from tfarm.dsp.scenarios import Scenario
-from tfarm.dsp.simulate import Simulator
-from tfarm.dsp.simulation import Simulation
-from tfarm.errors import MISSING, did_you_mean, list_within, must_be_known, name_file, require
-from tfarm.files import read_mat
-from tfarm.fitting.data import MOST_RECORD_BYTES, Measured, check_signal, read_sheet
+from tfarm.arrays import Real
+from tfarm.errors import MISSING, ParameterError, did_you_mean, list_within, name_file, require
+from tfarm.fitting.columns import read_columns
+from tfarm.fitting.signals import TIMES, RecordSignal, known_unit, si_unit, signal_of
 from tfarm.records import frozen
-from tfarm.schema import Quantity, Table
 
 # of a signal: the fourth power is a number, as spectra are squared
 MOST_SAMPLE = 1e70
@@ -60,9 +23,11 @@ LEAST_SAMPLES = 8
 
 @frozen(slots=True, kw_only=True)
 class Recording:
-    """Signals (n,) by name, sampled every `period` [s] from `start` [s] on.
+    """Signals (n,) by name in SI units, sampled every `period` [s] from `start` [s] on.
 
-    `jitter` is the largest distance of the times from even ones, as a share of the period.
+    `jitter` is the largest distance of the times from even ones, as a share of the period.  `sigma` has the standard
+    deviations that are known, `unknown` the units of columns that are no SI units and none that is known: as they are.
+    `filtering` states the filter of a decimation.
     """
 
     signals: dict[str, Real]
@@ -71,6 +36,9 @@ class Recording:
     jitter: float
     source: str
     digest: str
+    sigma: Mapping[str, float] = field(default_factory=dict)
+    unknown: Mapping[str, str] = field(default_factory=dict)
+    filtering: str = ""
 
     @property
     def count(self) -> int:
@@ -83,71 +51,97 @@ class Recording:
         return np.asarray(self.start + self.period * np.arange(self.count))
 
     def signal(self, name: str, key: str) -> Real:
-        """Return the signal of that name.  Raises ParameterError, naming `key`, with the nearest one there is."""
+        """Return the signal of that name.
+
+        Raises ParameterError, naming `key`, with the nearest one there is, and for one of an unknown unit.
+        """
         require(name in self.signals, key, name, did_you_mean(name, self.signals), self.source)
+        if name in self.unknown:
+            RecordSignal(name=name, column=name).in_si(self.signals[name], self.unknown[name])
         return self.signals[name]
 
     @property
     def note(self) -> str:
-        """The unevenness of its sampling; nothing where the samples are even."""
+        """The unevenness of its sampling, and the filter of a decimation; nothing where there is neither."""
+        found = [self.filtering] if self.filtering else []
         # times written in few digits are off by less
-        if self.jitter <= 1e-3:
-            return ""
-        return f"sampled unevenly, by up to {100 * self.jitter:.2g} % of the period"
+        if self.jitter > 1e-3:
+            found.insert(0, f"sampled unevenly, by up to {100 * self.jitter:.2g} % of the period")
+        return "; ".join(found)
 
 
-def read_recording(path: str | os.PathLike[str]) -> Recording:
-    """Return the record of a CSV file with a column t [s], or of a .mat file with a vector t (or time).
+def read_recording(
+    path: str | os.PathLike[str], signals: Sequence[str | RecordSignal] | None = None
+) -> Recording:
+    """Return the record of a CSV, .mat, HDF5, Parquet or UFF file with a column t (or time).
 
-    A matrix of a .mat file with a row a sample is one signal a column: "X.1", "X.2", ...  Raises ParameterError, naming
-    the file, where there are no times, no signals, or samples that are not even.
+    `signals` name columns with units and scales as `signals.signal_of` reads them, "hub_angle=enc[deg]": these alone
+    are read then, besides the times.  A matrix with a row a sample is one signal a column: "X.1", "X.2", ...
+    Units are those of the file or of `signals`, SI units where neither has one; values are returned in SI units.
+
+    Raises ParameterError, naming the file, where there are no times, no signals, samples that are not even or no
+    finite numbers, and for units of a signal that are unknown or of another quantity.
     """
-    name = os.fspath(path)
-    if name.lower().endswith(".mat"):
-        found, data = read_mat(name, MOST_RECORD_BYTES, key="record")
-        held = {}
-        for each, value in found.items():
-            if value.ndim == 2 and value.dtype.kind in "biuf":
-                held[each] = value.astype(float)
-        units = dict.fromkeys(held, "")
-        digest = hashlib.sha256(data).hexdigest()
-    else:
-        sheet = read_sheet(name, key="record")
-        held = sheet.columns
-        units = sheet.units
-        digest = sheet.digest
-    with name_file(name):
-        of_times = next((each for each in ("t", "time") if each in held), "")
-        columns = _columns(held, held[of_times].size) if of_times else {}
-        remedy = f"a record has a column t, in seconds; this one has {list_within(held, 300) or 'none'}"
-        require(of_times in columns, "t", MISSING, remedy)
-        require(units[of_times] in ("", "s"), f"unit of {of_times}", units[of_times], "times are in seconds")
-        start, period, jitter = even_timing(columns.pop(of_times))
-        require(columns, "signals", MISSING, "a column of times and no other")
-    return Recording(signals=columns, start=start, period=period, jitter=jitter, source=name, digest=digest)
+    named = [signal_of(each) if isinstance(each, str) else each for each in signals or ()]
+    chosen = [each for each in named if each.name not in TIMES]
+    source = os.fspath(path)
+    with name_file(source):
+        wanted = {*TIMES, *(each.column for each in named)} if chosen else None
+        sheet = read_columns(source, wanted)
+        own = next((name for name in TIMES if name in sheet.columns), TIMES[0])
+        of_times = [each for each in named if each.name in TIMES] or [RecordSignal(name=own, column=own)]
+        name = of_times[0].column
+        require(len(of_times) == 1, of_times[0].key, name, "is one column of times, and there is another one")
+        remedy = (
+            f"a record has a column t, in seconds; this one has {list_within(sheet.units, 300) or 'none'}"
+        )
+        require(name in sheet.columns, name, MISSING, remedy)
+        times = sheet.columns[name]
+        check_finite(name, times)
+        start, period, jitter = even_timing(of_times[0].in_si(times, sheet.units[name]))
+        columns = {key: of for key, of in sheet.columns.items() if of.size == times.size}
+        others = [key for key in columns if key not in (name, *TIMES)]
+        every = chosen or [RecordSignal(name=key, column=key) for key in others]
+        require(every, "signals", MISSING, "a column of times and no other")
+        found: dict[str, Real] = {}
+        unknown: dict[str, str] = {}
+        for each in every:
+            # with columns that were not read
+            known = [key for key in sheet.units if key in columns or key not in sheet.columns]
+            require(each.column in columns, each.key, each.column, did_you_mean(each.column, known))
+            require(each.name not in found, each.key, each.name, "is given twice; once is enough")
+            values = columns[each.column]
+            unit = sheet.units[each.column]
+            check_finite(each.column, values)
+            if chosen or si_unit(each.name) or not unit or known_unit(unit):
+                found[each.name] = each.in_si(values, unit)
+            else:
+                found[each.name] = values
+                unknown[each.name] = unit
+    return Recording(
+        signals=found,
+        start=start,
+        period=period,
+        jitter=jitter,
+        source=source,
+        digest=sheet.digest,
+        sigma={each.name: each.sigma for each in chosen if each.sigma is not None},
+        unknown=unknown,
+    )
 
 
-def _columns(held: dict[str, Real], size: int) -> dict[str, Real]:
-    """Return vectors of that size and the columns of matrices that have as many rows."""
-    columns: dict[str, Real] = {}
-    for name, value in held.items():
-        if max(value.shape) == value.size == size:
-            columns[name] = value.ravel()
-        elif len(value) == size:
-            columns |= {f"{name}.{number}": column for number, column in enumerate(value.T, start=1)}
-    for name, column in columns.items():
-        for at in np.flatnonzero(~(abs(column) <= MOST_SAMPLE))[:1]:
-            require(
-                False,
-                f"{name}, sample {at + 1}",
-                float(column[at]),
-                f"no finite number up to {MOST_SAMPLE:g}",
-            )
-    return columns
+def check_finite(name: str, values: Real) -> None:
+    """Raise ParameterError, naming the sample, for what is no number or too large to be one of a rig."""
+    for at in np.flatnonzero(~(abs(values) <= MOST_SAMPLE))[:1]:
+        remedy = f"no finite number up to {MOST_SAMPLE:g}; cut the record there"
+        raise ParameterError(key=f"{name}, sample {at + 1}", value=float(values[at]), remedy=remedy)
 
 
 def even_timing(times: Real) -> tuple[float, float, float]:
-    """Return start and period [s] of even samples, and the largest distance from them as a share of the period."""
+    """Return start and period [s] of even samples, and the largest distance from them as a share of the period.
+
+    Raises ParameterError, naming the sample, where times go back, and where samples are doubled, missing or uneven.
+    """
     require(
         times.size >= LEAST_SAMPLES, "samples", times.size, f"a record has {LEAST_SAMPLES} samples at least"
     )
@@ -157,293 +151,98 @@ def even_timing(times: Real) -> tuple[float, float, float]:
     def require_at(at: int, is_met: bool, remedy: str) -> None:
         require(is_met, f"t of sample {at + 2}", float(times[at + 1]), remedy)
 
-    back = int((steps <= 0).argmax())
-    remedy = "is not later than the sample before; sort the rows, and leave doubled ones out"
-    require_at(back, steps[back] > 0, remedy)
+    back = int((steps < 0).argmax())
+    remedy = (
+        f"is earlier than the sample before, at {times[back]:.9g} s: sort the rows, or cut the record there"
+    )
+    require_at(back, steps[back] >= 0, remedy)
+    double = int((steps == 0).argmax())
+    remedy = (
+        f"is that of the sample before too, as of {np.count_nonzero(steps == 0)} samples: leave doubled ones out, "
+        "or write t with more digits"
+    )
+    require_at(double, steps[double] > 0, remedy)
     period = float(np.ptp(times) / steps.size)
     require(period > 1 / MOST_SAMPLE, "period of t", period, "times are in seconds")
     gap = int(abs(steps - usual).argmax())
     jitter = float(abs(times - times[0] - period * np.arange(times.size)).max() / period)
+    gaps = steps[steps > 1.5 * usual]
+    if gaps.size:
+        missing = int(np.round(gaps / usual - 1).sum())
+        how = f"{missing} samples are missing in {gaps.size} gaps; cut the record there"
+    else:
+        how = f"samples are off even ones by up to {100 * jitter:.2g} % of the period, of 10 % at most"
     # a sample further off its place has been dropped or doubled, or the sampling is uneven
-    remedy = f"{steps[gap]:.6g} s after the one before, where {usual:.6g} s is usual: samples have to be even"
+    remedy = (
+        f"{steps[gap]:.6g} s after the one before, where {usual:.6g} s is usual: {how} (nothing is resampled)"
+    )
     require_at(gap, jitter <= 0.1, remedy)
     return float(times[0]), period, jitter
 
 
-class RunTable(StrictTable):
-    """[measured]."""
+def decimated(recording: Recording, by: int, held: str = "") -> Recording:
+    """Return every `by`-th sample of a record.
 
-    file: str
-    source: str = ""
+    Without `held`, for estimates of one signal over another and for decays: every signal passes the same symmetric FIR
+    filter first (`scipy.signal.firwin`, Kaiser window), without a shift in time.  Its gain is 1 within 1e-4 up to
+    0.8 of half the new sampling rate, and below 1e-4 beyond all of it.  Ends of the record that it has no samples for,
+    25 new samples each, are left out.
 
+    `held` names the commanded input of a rig whose model is sampled, with an input that is held from each sample to
+    the next.  A filtered input is held no longer, and outputs of a filter are no samples of the rig: the model at the
+    longer period would answer an input that never was.  So such a record is not filtered.  It is decimated where the
+    input is constant over each `by` samples, as under a slow controller: every `by`-th sample, from one at which the
+    input changes, is then exactly the record of the slow loop.
 
-@frozen
-class MeasuredRun:
-    """A measured run: `t` (n,) [s] from 0 on, the `reference` (n,) [rad] of the hub's angle, and what was read.
-
-    `hub_angle` (n,) [rad] and `root_moment` (n,) [N m] are empty where they were not measured.
+    Raises ParameterError for an input that changes in between, and where too few samples are left.
     """
-
-    t: Real
-    reference: Real
-    hub_angle: Real
-    root_moment: Real
-    source: str = ""
-
-    def scenario(self, period: float) -> Scenario:
-        """Return the same task at samples: from rest at the first reference, with the reference relative to that.
-
-        The reference is interpolated linearly between its rows.
-        """
-        t = period * np.arange(int(self.t[-1] / period * (1 + TIME_ROUNDING)) + 1)
-        reference = np.interp(t, self.t, self.reference) - self.reference[0]
-        none = np.zeros(t.size)
-        until = self.t[self.reference != self.reference[-1]].max(initial=0.0)
-        return Scenario("measured", period, none, reference, none, none, none, busy_until=float(until))
-
-    @property
-    def step(self) -> float:
-        """The change [rad] of the reference from first to last."""
-        return float(self.reference[-1] - self.reference[0])
-
-
-@frozen
-class RunComparison:
-    """A measured run and that of the exact sampled loop under the same reference; `run` is relative to the start."""
-
-    measured: MeasuredRun
-    run: Simulation
-
-    @property
-    def hub_angle(self) -> Real:
-        """The computed hub angle [rad] at the samples, from the first reference on."""
-        return self.run.at_samples.hub_angle + self.measured.reference[0]
-
-
-def compare_run(case: Case, measured: MeasuredRun) -> RunComparison:
-    """Return the sampled loop under the reference of a measured run, with as many modes as its signals take.
-
-    Raises ParameterError as `simulate` does.
-    """
-    run, _ = simulate_modes(case, measured.scenario(case.chain.sampling.period))
-    return RunComparison(measured, run)
-
-
-def departures(
-    case: Case, measured: MeasuredRun, count: int, longer: float, share: float = 0.05
-) -> list[float]:
-    """Return the times [s] after a measured run at which the computed hub angle is off its end, by a share of the step.
-
-    The reference stays for that much `longer` [s], of 10,000 samples at most; `count` modes are in the loop.
-    """
-    period = case.chain.sampling.period
-    end = float(measured.t[-1])
-    t = np.append(measured.t, end + min(longer, 10_000 * period))
-    held = replace(measured, t=t, reference=np.append(measured.reference, measured.reference[-1]))
-    run = Simulator(case, held.scenario(period), count=count).run().at_samples
-    settled = run.hub_angle[run.t <= end][-1]
-    away = abs(run.hub_angle - settled) > share * abs(measured.step)
-    return run.t[away & (run.t > end)].tolist()
-
-
-def overshoot(angle: Real, step: float, end: float) -> float:
-    """Return the overshoot of an angle [rad] beyond the `end` of a step [rad], as a share of it.
-
-    Below 0 where it has none.
-    """
-    if step:
-        return float(np.max((angle - end) * np.sign(step)) / abs(step))
-    return 0.0
-
-
-def load_run(name_or_path: AnyFile) -> MeasuredRun | None:
-    """Return the run of a file's [measured] table, None where it has none.
-
-    Raises ParameterError for an unknown key, and for a record without these signals or that is none, naming the file.
-    """
-    tables, file = load_tables(name_or_path)
-    if "measured" not in tables:
-        return None
-    with name_file(file):
-        table = validate_table(RunTable, tables["measured"], "measured")
-        found = read_recording(Path(file).parent / table.file)
-        reference = found.signal("reference:hub_angle", "measured.file")
-        require(
-            {"hub_angle", "root_moment"} & found.signals.keys(),
-            "measured.file",
-            table.file,
-            "has neither hub_angle [rad] nor root_moment [N m] with reference:hub_angle [rad]",
+    require(isinstance(by, int) and by >= 1, "decimate", by, "a whole number, 1 or more")
+    if by == 1:
+        return recording
+    rate = 1 / recording.period
+    if held:
+        remedy = f"needs {held}, by which the samples of the slow loop are known; use every sample"
+        require(held in recording.signals, "decimate", by, remedy, recording.source)
+        first = held_phase(recording.signals[held], by)
+        remedy = (
+            f"{held} changes within {by} samples: a filtered input is held no longer, and the model of the rig is "
+            "that of a held one; use every sample, or cut the record"
         )
-    angle, moment = (found.signals.get(name, np.empty(0)) for name in ("hub_angle", "root_moment"))
-    return MeasuredRun(found.times - found.start, reference, angle, moment, table.source)
+        require(first is not None, "decimate", by, remedy, recording.source)
+        signals = {name: values[first::by] for name, values in recording.signals.items()}
+        ahead = int(first or 0)
+        words = f"one sample of {by}, without a filter: {held} is constant in between"
+    else:
+        from scipy.signal import firwin, upfirdn
 
-
-@frozen(slots=True, kw_only=True)
-class Estimate:
-    """A response with what it was estimated by: `segments` of `segment` [s], `overlap` as a share of one.
-
-    `independent` averages are in them, `note` is that of the record's sampling.
-    """
-
-    measured: Annotated[Measured, Quantity(flat=True, help="estimated response with its coherence")]
-    estimator: Annotated[
-        str, Quantity("estimator", help="H1 (noise on the output), H2 (on the input) or Hv (between them)")
-    ]
-    window: Annotated[str, Quantity("window", help="taper of each segment: hann or boxcar")]
-    segment: Annotated[float, Quantity("segment", "s", help="length of one segment of the record")]
-    segments: Annotated[int, Quantity("segments", help="number of segments that are averaged")]
-    overlap: Annotated[
-        float, Quantity("overlap", digits=3, help="share of a segment that it has in common with the next")
-    ]
-    independent: Annotated[
-        float,
-        Quantity(
-            "independent averages",
-            digits=4,
-            key="independent_averages",
-            help="segments that count as independent, by Welch (1967)",
-        ),
-    ]
-    note: Annotated[
-        str,
-        Quantity(
-            "sampling of the record", help="unevenness of the sampling; empty where the samples are even"
-        ),
-    ]
-
-    @property
-    def resolution(
-        self,
-    ) -> Annotated[
-        float,
-        Quantity("frequency resolution", "Hz", 4, "distance of the lines: one over the segment's length"),
-    ]:
-        """The distance of the lines [Hz]: 1/segment."""
-        return 1.0 / self.segment
-
-    @property
-    def median_coherence(
-        self,
-    ) -> Annotated[float, Quantity("median coherence", digits=4, help="over all lines, from 0 to 1")]:
-        """Over all lines."""
-        return float(np.median(self.measured.coherence))  # type: ignore[arg-type]
-
-    @property
-    def response(
-        self,
-    ) -> Annotated[list[dict[str, Any]], Quantity(help="estimate with its coherence, a row a frequency")]:
-        """A row a frequency."""
-        return list(self.csv_table)
-
-    @property
-    def csv_table(self) -> Table:
-        """The same, as `read_measured` reads it."""
-        return self.measured.csv_table
-
-
-def frequency_response(
-    recording: Recording,
-    output: str,
-    input: str,
-    *,
-    columns: tuple[str, str] | None = None,
-    estimator: str = "H1",
-    window: str = "hann",
-    segment: float | None = None,
-    overlap: float | None = None,
-) -> Estimate:
-    """Return the response `output`/`input` of a record, from its signals of these names or of those in `columns`.
-
-    `segment` [s] is by default an eighth of the record, `overlap` half of it with a window that tapers, else none.
-    Raises ParameterError for signals that are not there, for a segment that leaves no two of them, and for an input
-    that does not move.
-    """
-    from scipy.signal import get_window
-
-    check_signal(output, "--output")
-    check_signal(input, "--input")
-    must_be_known("--estimator", estimator, ("H1", "H2", "Hv"))
-    must_be_known("--window", window, ("hann", "boxcar"))
-    names = columns or (output, input)
-    y = recording.signal(names[0], "--output")
-    x = recording.signal(names[1], "--input")
-    if overlap is None:
-        overlap = 0.5 * (window == "hann")
-    size, step = segment_size(recording, segment, overlap)
-    how = {"window": window, "nperseg": size, "noverlap": size - step}
-    lines, values, coherence = averaged_response(estimator, x, y, how)
-    require(lines.size, "record", names[1], "does not move", recording.source)
-    require(coherence.any(), "record", names[0], "does not move", recording.source)
-    count = 1 + (recording.count - size) // step
-    duration = size * recording.period
-    averages = independent_averages(get_window(window, size), step, count)
-    measured = Measured(
-        output=output,
-        input=input,
-        omega=np.asarray(2 * np.pi * lines / duration, dtype=float),
-        values=values,
-        coherence=coherence,
-        averages=max(1, math.floor(averages)),
-        source=recording.source,
-        digest=recording.digest,
-    )
-    return Estimate(
-        measured=measured,
-        estimator=estimator,
-        window=window,
-        segment=duration,
-        segments=count,
-        overlap=1.0 - step / size,
-        independent=averages,
-        note=recording.note,
+        # taps over `by` of a filter of 80 dB that falls within 0.2 of half the new rate, by Kaiser's formula
+        length = 50
+        taps = firwin(length * by + 1, 0.9 / by, window=("kaiser", 7.857))
+        ahead = length // 2 * by
+        last = (recording.count - 1) // by + 1
+        signals = {
+            name: upfirdn(taps, values, 1, by)[length:last] for name, values in recording.signals.items()
+        }
+        words = (
+            f"one sample of {by}, after a symmetric FIR filter of {taps.size} taps (Kaiser) on every signal: gain 1 "
+            f"within 1e-4 up to {0.4 * rate / by:.4g} Hz, below 1e-4 from {0.5 * rate / by:.4g} Hz on"
+        )
+    count = next(iter(signals.values())).size
+    remedy = f"leaves {count} of {recording.count} samples; at least {LEAST_SAMPLES}"
+    require(count >= LEAST_SAMPLES, "decimate", by, remedy, recording.source)
+    return replace(
+        recording,
+        signals=signals,
+        start=recording.start + ahead * recording.period,
+        period=by * recording.period,
+        jitter=recording.jitter / by,
+        filtering=words,
     )
 
 
-def averaged_response(
-    estimator: str, x: Real, y: Real, how: dict[str, Any]
-) -> tuple[NDArray[np.intp], Complex, Real]:
-    """Return the lines that the input has power in, the response and the coherence there.
-
-    Without the line at 0 and the last one, at half the rate of sampling, which are real.
-    """
-    from scipy.signal import csd, welch
-
-    _, S_xx = welch(x, **how)
-    _, S_xy = csd(x, y, **how)
-    _, S_yy = welch(y, **how)
-    lines = np.arange(1, S_xx.size - 1)
-    # of the largest line of the input: below it there are rounding errors alone
-    lines = lines[S_xx[lines] > 1e-24 * S_xx.max()]
-    S_xx = S_xx[lines]
-    S_yy = S_yy[lines]
-    cross = abs(S_xy[lines])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        if estimator == "H1":
-            size = cross / S_xx
-        elif estimator == "H2":
-            size = np.where(cross == 0, 0.0, S_yy / cross)
-        else:
-            size = np.sqrt(S_yy / S_xx)
-        phase = np.where(cross == 0, 1.0, S_xy[lines] / cross)
-        coherence = np.where(S_yy > 0, cross**2 / (S_xx * S_yy), 0.0)
-    return lines, size * phase, np.clip(coherence, 0.0, 1.0)
-
-
-def independent_averages(w: Real, step: int, count: int) -> float:
-    """Return the number of independent averages in a number of overlapped segments (Welch 1967)."""
-    j = np.arange(1, min(count, math.ceil(w.size / step)))
-    rho = np.array([w[: w.size - lag] @ w[lag:] for lag in j * step]) / (w @ w)
-    return float(count / (1 + 2 * (1 - j / count) @ rho**2))
-
-
-def segment_size(recording: Recording, segment: float | None, overlap: float) -> tuple[int, int]:
-    """Return samples of a segment, and from one to the next."""
-    require(0 <= overlap < 1, "--overlap", overlap, "a share of a segment from 0 to below 1, such as 0.5")
-    whole = recording.count * recording.period
-    least = LEAST_SAMPLES * recording.period
-    # by default 15 segments, half overlapped
-    wanted = whole / 8 if segment is None else segment
-    remedy = f"seconds between {least:.4g} and {whole / 2:.4g}, half the record: one average has no coherence"
-    require(least <= wanted <= whole / 2 * (1 + 1e-9), "--segment", wanted, remedy)
-    size = min(round(wanted / recording.period), recording.count // 2)
-    return size, max(1, round(size * (1 - overlap)))
+def held_phase(values: Real, by: int) -> int | None:
+    """Return the first sample of the blocks of `by` samples in which a signal is constant; None where it is not."""
+    changes = (np.flatnonzero(np.diff(values)) + 1) % by
+    if not changes.size:
+        return 0
+    return int(changes[0]) if (changes == changes[0]).all() else None

@@ -30,9 +30,10 @@ from scipy.linalg import solve_discrete_are
 from scipy.special import chdtrc
 
 from tfarm.arm import AT_HUB, Arm
-from tfarm.arm.chain import Chain
+from tfarm.arm.chain import Chain, Sampling
 from tfarm.arrays import Real
 from tfarm.case import Case
+from tfarm.dsp import kernel
 from tfarm.dsp.discretise import acting_law
 from tfarm.dsp.kernel import law_outputs
 from tfarm.dsp.plant import Plant
@@ -40,11 +41,11 @@ from tfarm.dsp.pulse import PulseTransfer
 from tfarm.dsp.results import ideal_chain
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.sensed import sensed_plant
-from tfarm.dsp.simulate import LinearLoop, references_of
+from tfarm.dsp.simulate import LinearLoop, quantisers, references_of
 from tfarm.errors import ParameterError, require
+from tfarm.fitting.held import modes_at_period
 from tfarm.fitting.runs import Run
 from tfarm.records import frozen
-from tfarm.spectrum import modes_below
 
 DRIVE_DELAY = "drive.delay"
 BIAS = "drive.bias"
@@ -79,6 +80,7 @@ class FitRun:
     numbers it has of its own: with `is_moving` also the hub's drift and amplitudes of the lowest modes at the start.
     `arm` is the number of its arm, where there are several.  `disturbance` has the places of the deviations of a torque
     on the input over those of each output's noise, where errors are those of the Kalman predictor.
+    One that `is_ideal` has no steps and limits of its chain.
     """
 
     run: Run
@@ -93,6 +95,7 @@ class FitRun:
     delay: int | None = None
     arm: int = 0
     disturbance: tuple[int, ...] = ()
+    is_ideal: bool = True
 
     @property
     def size(self) -> int:
@@ -108,6 +111,13 @@ class FitRun:
     def log_deviation(self) -> float:
         """The sum of ln sigma over all residuals."""
         return self.run.count * math.fsum(map(math.log, self.sigma))
+
+    @property
+    def least_deviation(self) -> Real:
+        """The deviation (outputs,) of rounding to the steps of the chain's converters, step/sqrt(12)."""
+        (encoder, moment, _) = quantisers(self.chain)[:, 0]
+        steps = {"hub_angle": encoder, "root_moment": moment}
+        return np.array([steps.get(name, 0.0) for name in self.run.names]) / math.sqrt(12)
 
     @cached_property
     def measured(self) -> Real:
@@ -143,10 +153,11 @@ class FitRun:
         """Return it with each deviation that is not known as its own residuals say, times the root of a share."""
         rows = residuals.reshape(len(self.sigma), -1)
         factors = np.maximum(np.sqrt((rows**2).mean(axis=1) * share), 1e-12)
+        sigma = np.maximum(np.array(self.sigma) * factors, self.least_deviation)
+        sigma = np.where(self.is_known, self.sigma, sigma)
         # of a deviation: a change that moves no number
-        if (abs(factors - 1) < 1e-6)[~np.array(self.is_known)].all():
+        if np.allclose(sigma, self.sigma, rtol=1e-6, atol=0.0):
             return self
-        sigma = np.array(self.sigma) * np.where(self.is_known, 1.0, factors)
         return replace(self, sigma=tuple(sigma.tolist()))
 
     # ------------------------------------------------------------ outputs
@@ -154,29 +165,41 @@ class FitRun:
     def respond(self, arm: Arm, value: Callable[[int], float]) -> RunResponse:
         """Return the outputs of an arm; `value` gives the number of a place in what is searched for."""
         pulse = self.pulse(arm, value)
-        loop = self.loop(arm, value, pulse)
-        rows = [pulse.plant.outputs.index(name) for name in self.run.names]
-        zero = np.zeros((len(pulse.plant.outputs), self.run.count))
-        columns = [self._motion(pulse, loop, 0.0, 1.0, zero)]
-        columns += [self._motion(pulse, loop, 0.0, 0.0, signals) for signals in self._free(pulse, rows)]
-        found = self._motion(pulse, loop, 1.0, 0.0, zero)
+        loop = None if self.run.law is None else self.loop(arm, value)
+        rows = self.rows(pulse)
+        found = pulse.held_response(self.commands(loop))
+        columns = [self.on_torque(pulse, loop, np.ones(self.run.count))]
+        for on_signals in self._free(pulse, rows):
+            if loop is not None:
+                on_hub = np.zeros(self.run.count)
+                on_signals = on_signals + pulse.held_response(loop.input(-loop.read(on_signals), on_hub))
+            columns.append(on_signals)
         return RunResponse(found[rows], np.array(columns)[:, rows])
 
-    def _motion(
-        self, pulse: PulseTransfer, loop: RunLoop | None, share: float, bias: float, signals: Real
-    ) -> Real:
-        """Return the outputs (names, n) under a share of the commands, a bias, and added signals (names, n)."""
-        steady = bias * np.ones(self.run.count)
+    def rows(self, pulse: PulseTransfer) -> list[int]:
+        """Return the places of the run's signals among those of its plant."""
+        return [pulse.plant.outputs.index(name) for name in self.run.names]
+
+    def commands(self, loop: RunLoop | None, offsets: Real | None = None) -> Real:
+        """Return the input (n,): that of the record, or of its controller, whose sensors have offsets (outputs,)."""
+        run = self.run
         if loop is None:
-            assert self.run.input is not None
-            u = share * self.run.input + steady
-            return pulse.held_response(u) + signals if u.any() else signals
-        u = loop.input(share * loop.wanted - loop.read(signals), steady)
-        found = pulse.held_response(u) + signals
-        if bias:
-            at_once = PulseTransfer(pulse.plant, replace(pulse.sampling, delay_samples=0.0))
-            found = found + at_once.held_response(steady)
-        return found
+            assert run.input is not None
+            return run.input if self.is_ideal else converted(run.input, quantisers(self.chain)[kernel.DAC])
+        wanted = loop.wanted
+        if offsets is not None:
+            names = loop.linear.plant.outputs
+            off = np.zeros((len(names), run.count))
+            off[[names.index(name) for name in run.names]] = offsets[:, None]
+            wanted = wanted - loop.read(off)
+        return loop.input(wanted, np.zeros(run.count))
+
+    def on_torque(self, pulse: PulseTransfer, loop: RunLoop | None, torque: Real) -> Real:
+        """Return the signals (all of the plant, n) of a torque (n,) on the hub, and of a controller's answer to it."""
+        if loop is None:
+            return pulse.held_response(torque)
+        at_once = PulseTransfer(pulse.plant, replace(pulse.sampling, delay_samples=0.0))
+        return at_once.held_response(torque) + pulse.held_response(loop.input(0 * loop.wanted, torque))
 
     def pulse(self, arm: Arm, value: Callable[[int], float]) -> PulseTransfer:
         """Return the plant of the run's signals at the samples of its record, times the gains of sensors.
@@ -192,25 +215,28 @@ class FitRun:
         by_output = np.array([gains[name] for name in names])
         return PulseTransfer(plant.times(by_output), at_period(chain, self.run.period).sampling)
 
-    def loop(self, arm: Arm, value: Callable[[int], float], pulse: PulseTransfer) -> RunLoop | None:
-        """Return the controller round the plant of the run's signals; None of an open loop."""
-        if self.run.law is None:
-            return None
+    def loop(self, arm: Arm, value: Callable[[int], float]) -> RunLoop:
+        """Return the controller round the plant of the run's signals."""
+        assert self.run.law is not None
+        pulse = self.pulse(arm, value)
         acting, late = acting_law(Case(arm, self.run.law, self._chain(value)))
         return RunLoop(self.run, self.ratio, LinearLoop(pulse.plant, acting, late))
 
     def _chain(self, value: Callable[[int], float]) -> Chain:
         """Return the chain without steps and limits, of an open loop at the record's period, with the dead time."""
-        chain = ideal_chain(self.chain)
+        chain = ideal_chain(self.chain) if self.is_ideal else self.chain
         if self.run.law is None:
             chain = at_period(chain, self.run.period)
+        return replace(chain, sampling=self.dead_time(chain.sampling, value))
+
+    def dead_time(self, sampling: Sampling, value: Callable[[int], float]) -> Sampling:
+        """Return the sampling with the drive's dead time where that is free."""
         if self.delay is None:
-            return chain
-        delay = value(self.delay) / chain.sampling.period
-        return replace(chain, sampling=replace(chain.sampling, delay_samples=delay))
+            return sampling
+        return replace(sampling, delay_samples=value(self.delay) / sampling.period)
 
     def _free(self, pulse: PulseTransfer, rows: Sequence[int]) -> Iterator[Real]:
-        """Yield outputs (names, n) by a unit of each offset, of the hub's drift, and of modes at the start."""
+        """Yield outputs (names, n) by a unit of each offset, of angular momentum and of modes at the start."""
         n = self.run.count
         plant = pulse.plant
         for row in rows:
@@ -239,11 +265,28 @@ class FitRun:
         found = [BIAS, *(f"offset of {name}" for name in self.run.names)]
         if self.is_moving:
             plant = sensed_plant(arm, self._chain(lambda _: 0.0), self.run.names, self.count).together
-            found += ["drift of the hub"] * bool(plant.rigid[:, 0].any())
+            found += ["angular momentum at the start"] * bool(plant.rigid[:, 0].any())
             for pole in self._moving(plant):
                 mode = f"mode {plant.mode[pole]}" if plant.mode[pole] else "hub or filter"
                 found += [f"{mode} at the start"] * (1 + (plant.poles[pole].imag > 0))
         return found
+
+    def chain_effects(self, arm: Arm, value: Callable[[int], float]) -> Real:
+        """Return the largest differences (outputs,) by steps and limits of the chain, over the deviations."""
+        ideal, stepped = (
+            each.commands(None if self.run.law is None else each.loop(arm, value))
+            for each in (self, replace(self, is_ideal=False))
+        )
+        pulse = self.pulse(arm, value)
+        off = pulse.held_response(stepped - ideal)[self.rows(pulse)]
+        return np.asarray(abs(off).max(axis=1) / self.sigma)
+
+    def drift(self, arm: Arm, value: Callable[[int], float]) -> float:
+        """Return the hub's angle [rad] at the end of an open loop by a unit of a bias; 0 of one that does not drift."""
+        if self.run.law is not None:
+            return 0.0
+        turning = sensed_plant(arm, self._chain(value), ("hub_angle",), self.count).together.rigid[0, 0]
+        return float(turning * self.run.t[-1] ** 2 / 2)
 
     # ------------------------------------------------------------ residuals
 
@@ -254,13 +297,21 @@ class FitRun:
     def residuals_with(self, arm: Arm, value: Callable[[int], float], own: Real) -> Real:
         """Return computed less measured over the deviations (size,), the run's own numbers (own,) given."""
         pulse = self.pulse(arm, value)
-        loop = self.loop(arm, value, pulse)
-        rows = [pulse.plant.outputs.index(name) for name in self.run.names]
+        rows = self.rows(pulse)
         bias, *others = own.tolist()
-        signals = np.zeros((len(pulse.plant.outputs), self.run.count))
+        found = np.zeros((len(pulse.plant.outputs), self.run.count))
         for number, one in zip(others, self._free(pulse, rows), strict=False):
-            signals += number * one
-        parts = (self._motion(pulse, loop, 1.0, bias, signals)[rows] - self.measured)[None]
+            found += number * one
+        steady = np.full(self.run.count, bias)
+        if self.run.law is None:
+            u = self.commands(None) + steady
+        else:
+            loop = self.loop(arm, value)
+            u = loop.input(loop.wanted - loop.read(found), steady)
+            at_once = PulseTransfer(pulse.plant, replace(pulse.sampling, delay_samples=0.0))
+            found += at_once.held_response(steady)
+        found += pulse.held_response(u)
+        parts = (found[rows] - self.measured)[None]
         return self._whitened(arm, value, parts)[0]
 
     def own_numbers(self, arm: Arm, value: Callable[[int], float]) -> tuple[Real, Real]:
@@ -297,9 +348,8 @@ class FitRun:
     def innovations(self, arm: Arm, value: Callable[[int], float], parts: Real) -> Real:
         """Return (1 + L) of deviations (rows, outputs, n): what the noise of sensors was before it went round."""
         pulse = self.pulse(arm, value)
-        loop = self.loop(arm, value, pulse)
-        assert loop is not None
-        rows = [pulse.plant.outputs.index(name) for name in self.run.names]
+        loop = self.loop(arm, value)
+        rows = self.rows(pulse)
         found = []
         for part in parts:
             read = np.zeros((len(pulse.plant.outputs), self.run.count))
@@ -320,7 +370,7 @@ class FitRun:
         states = pulse.integrals_at + 2
         by_torque = np.zeros(len(A))
         by_torque[:states] = at_once.matrices()[1][:states]
-        rows = [pulse.plant.outputs.index(name) for name in self.run.names]
+        rows = self.rows(pulse)
         # outputs over their noise, and a torque of deviation 1
         ratio = np.array([value(place) for place in self.disturbance])
         seen = C[rows] * ratio[:, None]
@@ -384,12 +434,6 @@ class RunLoop:
         return np.repeat(u, self.ratio)[: self.run.count]
 
 
-def modes_of_run(arm: Arm, run: Run) -> int:
-    """Return the number of modes that a run is computed with: up to four times the sampling rate's half, two more."""
-    most = 20
-    return min(most, modes_below(arm, 4 * math.pi / run.period) + 2)
-
-
 def fit_run(arm: Arm, run: Run, chain: Chain) -> FitRun:
     """Return a run as a fit begins with it: deviations that are not known a tenth of their signal's."""
     sigma = []
@@ -399,10 +443,19 @@ def fit_run(arm: Arm, run: Run, chain: Chain) -> FitRun:
     known = tuple(name in run.sigma for name in run.names)
     if run.law is not None and run.law.period is not None:
         chain = replace(chain, sampling=replace(chain.sampling, period=run.law.period))
-    found = FitRun(run, chain, modes_of_run(arm, run), tuple(sigma), known, is_moving=run.law is None)
+    is_moving = run.law is None if run.initial is None else run.initial == "free"
+    found = FitRun(run, chain, modes_at_period(arm, run.period), tuple(sigma), known, is_moving)
     # raises for a period that is no part of the controller's
     assert found.ratio
     return replace(found, own=len(found.own_names(arm)))
+
+
+def converted(values: Real, row: Real) -> Real:
+    """Return values on the steps and in the range of a converter, a row of `quantisers`."""
+    step, low, high = row
+    if step:
+        values = np.rint(values / step) * step
+    return np.clip(values, low, high)
 
 
 def at_period(chain: Chain, period: float) -> Chain:

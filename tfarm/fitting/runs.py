@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from tfarm.arm import AT_HUB, Arm, Law, Motor
 from tfarm.arm.law import REFERENCE, as_law
 from tfarm.arrays import Real
-from tfarm.errors import MISSING, require
+from tfarm.errors import MISSING, must_be_known, require
 from tfarm.exact.outputs import OUTPUTS
 from tfarm.fitting.data import check_signal
 from tfarm.records import frozen
@@ -31,7 +31,8 @@ class Run:
     `outputs` are measured signals by name ("hub_angle", "root_moment", "strain@0.05"), `input` is the commanded input
     of the plant, held from each sample to the next.  Under a `law` it may be left out, and `references` of the
     hub's angle, rate or moment take its place; a `law` that is None is an open loop.
-    `sigma` has the standard deviations of outputs that are known; others follow from the residuals.
+    `sigma` has the standard deviations of outputs that are known; others follow from the residuals.  `initial` is
+    "rest" or "free" at the first sample; by default an open loop is free, and a closed one rests.
     Raises ParameterError for arrays of other lengths, values that are no numbers, and a record without outputs, without
     input and references, or of an open loop without an input.
     """
@@ -42,6 +43,7 @@ class Run:
     references: Mapping[str, Real] = field(default_factory=dict)
     law: Law | None = None
     sigma: Mapping[str, float] = field(default_factory=dict)
+    initial: Literal["rest", "free"] | None = None
     source: str = "array"
     digest: str = ""
     note: str = ""
@@ -58,6 +60,7 @@ class Run:
             require(np.isfinite(values).all(), name, "nan or inf", "finite numbers; cut the record there")
         for name in self.outputs:
             check_signal(name, "output")
+        must_be_known("initial", self.initial or "rest", ("rest", "free"))
         for name in self.references:
             require(name in AT_HUB, "reference", name, f"of one of {', '.join(AT_HUB)}")
         for name, value in self.sigma.items():
@@ -87,6 +90,32 @@ class Run:
         """The measured signals."""
         return tuple(self.outputs)
 
+    @property
+    def is_led(self) -> bool:
+        """Whether a controller leads the hub's angle, which was measured, to a reference."""
+        return self.law is not None and "hub_angle" in self.references and "hub_angle" in self.outputs
+
+    @property
+    def driving(self) -> Real:
+        """What moves the arm (columns, n): the input of an open loop, or the references of a closed one."""
+        if self.law is None or not self.references:
+            return np.array([self.input])
+        return np.array([*self.references.values()])
+
+    @property
+    def driving_changes(self) -> Real:
+        """The same, of references the change from sample to sample: of a step nearly white."""
+        found = self.driving
+        if self.law is None or not self.references:
+            return found
+        return np.diff(found, axis=1, prepend=0.0)
+
+    @property
+    def busy_until(self) -> float:
+        """The time [s] of the last change of that."""
+        changes = (np.diff(self.driving, axis=1) != 0).any(axis=0)
+        return float(self.period * (1 + np.flatnonzero(changes).max(initial=-1)))
+
 
 def run_of(recording: Recording, arm: Arm, law: Law | None = None) -> Run:
     """Return the run that a record has of an arm: its columns by their names.
@@ -113,10 +142,24 @@ def run_of(recording: Recording, arm: Arm, law: Law | None = None) -> Run:
         input=columns.get(driven),
         references=references if law is not None else {},
         law=law,
+        sigma=recording.sigma,
         source=recording.source,
         digest=recording.digest,
         note=recording.note,
     )
+
+
+def from_rest(run: Run) -> tuple[Run, float]:
+    """Return a run in closed loop about its first hub angle, and that angle [rad], where it has a reference of it.
+
+    So the arm is at rest at 0 there, and so is the controller; a constant angle changes nothing else in a linear loop.
+    """
+    if not run.is_led:
+        return run, 0.0
+    start = float(run.outputs["hub_angle"][0])
+    outputs = {**run.outputs, "hub_angle": run.outputs["hub_angle"] - start}
+    references = {**run.references, "hub_angle": run.references["hub_angle"] - start}
+    return replace(run, outputs=outputs, references=references), start
 
 
 # free number of a fit: torque at the hub over what was commanded, in whatever unit that is

@@ -270,29 +270,41 @@ def solution_of_runs(problem: Problem, draws: int) -> Solution:
     if problem.responses:
         points.append(best_solution(replace(problem, runs=())).point)
     least = periods * 2 * math.pi / first_frequency(problem.arm(start))
-    whole = max(each.run.count * each.run.period for each in problem.runs)
-    first: list[Real] = []
-    for duration in (least, math.sqrt(least * whole), whole):
-        part = replace(problem, runs=tuple(each.until(duration) for each in problem.runs))
-        kept = sorted(points, key=partial(sum_of_squares, part))[: 3 if duration == least else 2]
-        found = [nearest_minimum(part, each, evaluations=20, change=1e-3) for each in kept]
-        points = [each.point for each in distinct(found)]
-        first = first or points
-    # noise of unknown size is weighed again, so that the search goes on
-    change = 1e-9 if found[0].has_known_noise else 1e-6
-    ends = [nearest_minimum(problem, each, change=change) for each in points]
-    best = rescale_noise(min(ends, key=lambda each: each.chi_squared))
+    best = rescale_noise(continued_minimum(problem, points, least))
     if any(each.reads_all for each in problem.runs):
         around = tuple(replace(each, through_loop=each.reads_all) for each in best.problem.runs)
-        other = rescale_noise(nearest_minimum(replace(best.problem, runs=around), best.point))
+        other = rescale_noise(
+            continued_minimum(replace(best.problem, runs=around), [*points, best.point], least)
+        )
         best = min(best, other, key=lambda each: each.misfit)
     is_driven = any(each.run.law is None for each in best.problem.runs)
     if is_driven and best.chance_of_white <= LEAST_CHANCE:
-        other = solution_with_disturbance(best, [start, *first])
+        part = replace(problem, runs=tuple(each.until(least) for each in problem.runs))
+        other = solution_with_disturbance(best, [start, continued_minimum(part, points, least).point])
         # each ratio has to explain more than noise alone would
-        least = EXCLUDED / 2 * (other.point.size - best.point.size)
-        best = min(best, other, key=lambda each: each.misfit + (least if each is other else 0.0))
+        surplus = EXCLUDED / 2 * (other.point.size - best.point.size)
+        best = min(best, other, key=lambda each: each.misfit + (surplus if each is other else 0.0))
     return best
+
+
+def continued_minimum(problem: Problem, points: Sequence[Real], least: float) -> Solution:
+    """Return the least sum of squares that searches from points come to, over parts of the runs from `least` [s] on."""
+    # of a coordinate: points so near are one
+    apart = 0.02
+    whole = max(each.run.count * each.run.period for each in problem.runs)
+    for duration in (least, math.sqrt(least * whole), whole):
+        part = replace(problem, runs=tuple(each.until(duration) for each in problem.runs))
+        some: list[Real] = []
+        for point in sorted(points, key=partial(sum_of_squares, part)):
+            if all(abs(point - each).max() > apart for each in some):
+                some.append(point)
+        kept = some[: 3 if duration == least else 2]
+        found = [nearest_minimum(part, each, evaluations=20, change=1e-3) for each in kept]
+        points = [each.point for each in distinct(found)]
+    # noise of unknown size is weighed again, so that the search goes on
+    change = 1e-9 if found[0].has_known_noise else 1e-6
+    ends = [nearest_minimum(problem, each, change=change) for each in points]
+    return min(ends, key=lambda each: each.chi_squared)
 
 
 def solution_with_disturbance(found: Solution, starts: Sequence[Real]) -> Solution:

@@ -28,7 +28,7 @@ from tfarm.plots.arm_sketch import sketch
 from tfarm.plots.frequency import bode, measured_response
 from tfarm.plots.fronts import trade_off
 from tfarm.plots.loop_function import disc, loop, nichols, nyquist, sensitivity
-from tfarm.plots.motion import modes, slew, step, tuned_gain
+from tfarm.plots.motion import modes, prediction, slew, step, tuned_gain
 from tfarm.plots.references import reference
 from tfarm.plots.regions import comparison, gain_map, gain_regions
 from tfarm.plots.roots import locus
@@ -49,6 +49,7 @@ __all__ = [
     "modes",
     "nichols",
     "nyquist",
+    "prediction",
     "reference",
     "sensitivity",
     "sketch",

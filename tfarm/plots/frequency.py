@@ -23,6 +23,7 @@ from tfarm.plots.style import (
     COLOURS,
     DASHED,
     FAINT,
+    FIGURES,
     GREY,
     INK,
     ORANGE,
@@ -257,6 +258,39 @@ def fit_curves(fit: Fit, *, ax: Sequence[Axes]) -> None:
     for one, (omega, before, after), upper, lower in zip(fit.responses, fit.curves, ax, below, strict=False):
         _over_measured(one, [(omega, before, start), (omega, after, best)], upper, lower)
         upper.set(title=one.label, xlabel="", ylabel=f"magnitude [{one.unit}]")
+
+
+def _most_signals(fit: Fit) -> int:
+    return max(len(each.names) for each in fit.run_curves)
+
+
+@picture(
+    size=lambda fit: (max(7.0, 4.7 * len(fit.problem.runs)), 0.8 + 3.2 * _most_signals(fit)),
+    title=lambda fit: f"{fit.before.name}: {fit.verdict}",
+    grid=lambda figure, fit: figure.subplots(
+        2 * _most_signals(fit),
+        len(fit.problem.runs),
+        sharex="col",
+        height_ratios=(1.75, 1.0) * _most_signals(fit),
+    ),
+)
+def fit_runs(fit: Fit, *, ax: Sequence[Axes]) -> None:
+    """Draw the runs of a fit (from `tfarm.fit`): each signal as measured and computed, with its residual below."""
+    rows = np.reshape(np.array(ax), (2 * _most_signals(fit), -1))
+    for column, found in zip(rows.T, fit.run_curves, strict=True):
+        signals = zip(found.names, found.measured, found.computed, strict=True)
+        for place, (name, measured, computed) in enumerate(signals):
+            label, unit = signal_words(name)
+            upper, lower = column[2 * place : 2 * place + 2]
+            upper.plot(found.t, measured, ".", ms=2.5, color=ORANGE, label="measured")
+            upper.plot(found.t, computed, color=BLUE, lw=1.0, label="fitted, exact sampled plant")
+            upper.set(ylabel=f"{label} [{unit}]")
+            lower.plot(found.t, computed - measured, color=GREY, lw=0.7)
+            lower.set(ylabel=f"residual [{unit}]")
+        column[-1].set(xlabel="time [s]")
+
+
+FIGURES.update({Fit: lambda fit: (fit_curves if fit.responses else fit_runs).figure(fit)})
 
 
 @picture(

@@ -1,7 +1,7 @@
 """Mode shapes of the arm, and the arm over time.
 
 Root moment, tip and motor are lines or, where these ring too fast for a page, bands.  Measured runs on a rig are drawn
-under the exact sampled loop with the same reference.  Of the tuner its gain and its guard on the map and over time, and
+with their predictions.  Of the tuner its gain and its guard on the map and over time, and
 its learning curves.
 """
 
@@ -20,13 +20,16 @@ from tfarm.assessment.step import Step
 from tfarm.digits import how_many, plain, significant
 from tfarm.dsp import Simulation, traces
 from tfarm.dsp.results import Run
-from tfarm.exact.outputs import OUTPUTS
-from tfarm.fitting.recording import RunComparison
+from tfarm.exact.outputs import OUTPUTS, signal_words
+from tfarm.fitting.experiment import Experiment
+from tfarm.fitting.prediction import Prediction
 from tfarm.loop.circle_crossings import GainMap
 from tfarm.loop.plane import Plane
+from tfarm.plots.frequency import along_hertz
 from tfarm.plots.regions import gain_regions
 from tfarm.plots.style import (
     BLUE,
+    COLOURS,
     DASHED,
     DOTTED,
     FAINT,
@@ -49,6 +52,7 @@ from tfarm.plots.style import (
 )
 from tfarm.schema import text
 from tfarm.spectrum import Modes
+from tfarm.spectrum.table import flexible_frequencies
 from tfarm.tuner import LearningCurves, Tuning
 
 ALONG = "distance from the hub, x [m]"
@@ -271,34 +275,87 @@ def _input_label(arm: Arm) -> str:
 FIGURES.update({Run: lambda run: slew.figure(run.arm, run.simulation, run.scenario_in_words)})
 
 
-def _measured_rows(each: Mapping[str, RunComparison]) -> int:
-    return 1 + any(found.measured.root_moment.size for found in each.values())
+def _signal_names(each: Mapping[str, Prediction]) -> tuple[str, ...]:
+    """Return the measured signals of some runs."""
+    return tuple(dict.fromkeys(name for found in each.values() for name in found.run.names))
 
 
 @picture(
-    size=lambda each: (max(4.7 * len(each), 6.0), 6.0 if _measured_rows(each) > 1 else 3.6),
-    title=lambda _: "Measured steps, and the exact sampled loop",
-    grid=lambda figure, each: figure.subplots(_measured_rows(each), len(each), sharex="col", sharey="row"),
+    size=lambda each: (max(4.7 * len(each), 6.0), 0.6 + 2.7 * len(_signal_names(each))),
+    title=lambda _: "Measured runs, and their predictions",
+    grid=lambda figure, each: figure.subplots(
+        len(_signal_names(each)), len(each), sharex="col", sharey="row", squeeze=False
+    ),
 )
-def draw_measured_runs(each: Mapping[str, RunComparison], *, ax: Sequence[Axes]) -> None:
-    """Draw a column a controller: hub angle above, root moment below where it was measured."""
+def draw_measured_runs(each: Mapping[str, Prediction], *, ax: Sequence[Axes]) -> None:
+    """Draw a column a run, in it a signal below the other: reference, measured, predicted with its band."""
+    names = _signal_names(each)
     axes = np.reshape(np.array(ax), (-1, len(each)))
-    for column, (name, found) in zip(axes.T, each.items(), strict=True):
-        measured = found.measured
-        run = found.run
-        reference = np.degrees(measured.reference)
-        column[0].plot(measured.t, reference, color=GREY, lw=1.0, ls=DASHED, label="reference")
-        signals = (
-            ("hub angle [deg]", np.degrees(measured.hub_angle), np.degrees(found.hub_angle)),
-            ("root moment [N m]", measured.root_moment, run.at_samples.root_moment),
-        )
-        for one, (label, seen, computed) in zip(column, signals, strict=False):
-            over_time(one, measured.t, label)
-            one.set_title(safe(name))
+    for column, (title, found) in zip(axes.T, each.items(), strict=True):
+        for one, name in zip(column, names, strict=True):
+            if name in found.run.names:
+                _draw_prediction(one, found, name)
             one.label_outer()
-            if seen.size:
-                one.plot(measured.t, seen, color=ORANGE, label="measured")
-            one.plot(run.t, computed, color=BLUE, lw=1.2, label="exact sampled loop")
+        column[0].set_title(safe(title))
+
+
+@picture(
+    (Prediction, "tfarm.predict returns"),
+    size=lambda found: (9.0, 0.6 + 2.7 * len(found.run.names)),
+    title=lambda found: f"{found.arm_name}: a run, and its prediction",
+    grid=lambda figure, found: figure.subplots(len(found.run.names), 1, sharex=True, squeeze=False),
+)
+def prediction(found: Prediction, *, ax: Sequence[Axes]) -> None:
+    """Draw a run and its prediction (from `tfarm.predict`), an axes a signal, in those given or new ones: these."""
+    for one, name in zip(np.ravel(np.array(ax)), found.run.names, strict=True):
+        _draw_prediction(one, found, name)
+        one.label_outer()
+
+
+def _draw_prediction(ax: Axes, found: Prediction, name: str) -> None:
+    """Draw one signal of a run with its prediction; angles in degrees."""
+    place = found.run.names.index(name)
+    of = OUTPUTS[name.partition("@")[0]]
+    unit = of.unit
+    scale = 1.0
+    if unit == "rad":
+        unit = "deg"
+        scale = math.degrees(1.0)
+    over_time(ax, found.t, f"{of.label} [{unit}]")
+    reference = found.run.references.get(name)
+    if reference is not None:
+        ax.plot(found.t, scale * reference, color=GREY, lw=1.0, ls=DASHED, label="reference")
+    ax.plot(found.t, scale * found.measured[place], color=ORANGE, label="measured")
+    values = scale * found.predicted[place]
+    half = found.halves[place]
+    if half is not None:
+        reach = scale * half
+        label = "95 % of possible arms, with noise"
+        ax.fill_between(found.t, values - reach, values + reach, color=BLUE, alpha=0.2, lw=0, label=label)
+    ax.plot(found.t, values, color=BLUE, lw=1.2, label="predicted")
+
+
+@picture(
+    (Experiment, "tfarm.experiment returns"),
+    size=(9.0, 7.0),
+    title=lambda found: f"{found.arm.name}: {found.best}",
+    grid=lambda figure, _: figure.subplots(3),
+)
+def draw_experiment(found: Experiment, *, ax: Sequence[Axes]) -> None:
+    """Draw the best excitation, the signals under it over their noise, and its spectrum with the arm's frequencies."""
+    upper, middle, lower = ax
+    over_time(upper, found.t, _input_label(found.arm))
+    upper.step(found.t, found.input, where="post", color=INK, lw=0.8)
+    over_time(middle, found.t, "signal over its noise [−]")
+    for (name, sigma), colour in zip(found.noise.items(), cycle(COLOURS), strict=False):
+        values = found.outputs[name] / sigma
+        middle.plot(found.t, values, color=colour, lw=1.0, label=signal_words(name)[0])
+    sizes = 2 * abs(np.fft.rfft(found.input)) / found.input.size
+    lower.plot(np.fft.rfftfreq(found.input.size, found.period), sizes, color=BLUE, lw=1.0)
+    for omega in flexible_frequencies(found.arm, math.pi / found.period).tolist():
+        lower.axvline(omega / (2 * math.pi), color=INK, lw=0.8, ls=DOTTED)
+    amplitude = f"amplitude [{found.arm.input_unit}]"
+    along_hertz(lower, "linear", xlim=(0.0, 0.5 / found.period), ylabel=amplitude)
 
 
 @picture(

@@ -29,7 +29,8 @@ from tfarm.exported.live_loop import LiveNumbers, live_data
 from tfarm.fitting.data import Measured
 from tfarm.fitting.fit import ARMS, Fit, ResponseBand, ShareOfArms, arms_drawn, response_band, stable_share
 from tfarm.fitting.overlay import Overlay, overlay
-from tfarm.fitting.recording import MeasuredRun, RunComparison, compare_run, departures
+from tfarm.fitting.prediction import Prediction, departures, predict
+from tfarm.fitting.run_files import MeasuredRun
 from tfarm.loop.continuous import ContinuousLoop, frequency_above_mode
 from tfarm.loop.curve import LoopCurve
 from tfarm.loop.loci import Loci, loci
@@ -209,11 +210,14 @@ class PageCase(OfCase):
         return step(self.arm, self.law, self.chain, "slew")
 
     @property
-    def run(self) -> RunComparison | None:
-        """The measured run with that of the sampled loop, if one was measured."""
-        if self.measured is None:
+    def prediction(self) -> Prediction | None:
+        """The measured run beside its prediction, if one was measured."""
+        found = self.measured
+        if found is None:
             return None
-        return compare_run(self.case, self.measured)
+        return predict(
+            self.arm, found.run, self.chain, law=self.law, before=found.before, posterior=found.posterior
+        )
 
     @property
     def growth(self) -> float:
@@ -228,7 +232,7 @@ class PageCase(OfCase):
         # as much longer as an unstable loop may seem settled
         longer = 20 * self.growth
         count = self.sampled.verdict.modes_used
-        return departures(self.case, self.measured, count, longer)
+        return departures(self.case, self.measured.run, count, longer)
 
     @property
     def live(self) -> LiveNumbers:

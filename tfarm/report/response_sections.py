@@ -392,10 +392,17 @@ def fit_section(report: ArmReport, count: int = ARMS) -> PageSection:
     if fit.responses:
         names = join_words([f"{each.label} [{each.unit}]" for each in fit.responses])
         blocks.append(picture_block("fit_overlay", frequency.fit_curves.figure(fit), names=names))
-    blocks += [
-        record_sheet("fitted", fit.parameters, stem="fit"),
-        record_sheet("fit_resonances", fit.resonances),
-    ]
+    if fit.problem.runs:
+        words += [f"{upper(each)}." for each in fit.run_notes]
+        blocks.append(picture_block("fit_runs", frequency.fit_runs.figure(fit)))
+    blocks.append(record_sheet("fitted", fit.parameters, stem="fit"))
+    if fit.responses:
+        blocks.append(record_sheet("fit_resonances", fit.resonances))
+    if fit.problem.runs:
+        blocks += [
+            record_sheet("fit_signals", fit.run_signals),
+            record_sheet("fit_own", fit.own_numbers),
+        ]
     try:
         possible = report.possible_arms(count)
     except ConvergenceError as error:

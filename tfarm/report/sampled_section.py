@@ -1,12 +1,11 @@
 """The sampled loops of a report: verdict, margins, stability intervals, modes, motion in time, and the gain tuner.
 
-In time: slews, and steps that were measured with the exact sampled loop over them.  Of the tuner: costs against
+In time: slews.  Of the tuner: costs against
 baselines, what it learns, and where it is proven.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -15,7 +14,6 @@ from tfarm.assessment.step import Step
 from tfarm.digits import plain, significant
 from tfarm.dsp import Chain, Simulation, scenarios, traces
 from tfarm.errors import CertificationError, ParameterError
-from tfarm.fitting.recording import RunComparison, overshoot
 from tfarm.loop.sampled_analysis import Analysis
 from tfarm.plots import animation, motion, regions, roots, style
 from tfarm.report.blocks import (
@@ -29,13 +27,13 @@ from tfarm.report.blocks import (
     sheet,
 )
 from tfarm.report.page import ArmReport, PageCase, has_loop
-from tfarm.schema import Column, Quantity, Table, across, table, text
+from tfarm.schema import Column, Table, across, table, text
 from tfarm.studies.candidates import WITHOUT, TunerNumbers
 from tfarm.synthesis.stability_map import StableRegions
 
 
 def sampled_section(report: ArmReport) -> PageSection:
-    """Return the sampled loop of each controller; in time runs measured under the laws, else the slew."""
+    """Return the sampled loop of each controller, in time the slew, where no run was measured under each."""
     chain = report.chain
     found = [(each, each.sampled) for each in report.cases]
     numbers = across({each.title: it for each, it in found}, keys=[each.key for each, _ in found])
@@ -67,7 +65,7 @@ def sampled_section(report: ArmReport) -> PageSection:
         title=f"The sampled loop, {plain(1e3 * chain.sampling.period)} ms",
         facts=facts,
         words=[" ".join([chain_words(report.arm, chain), *growths]), *words],
-        blocks=[*blocks, *measured_blocks(report), *pictures],
+        blocks=[*blocks, *pictures],
     )
 
 
@@ -261,51 +259,6 @@ def response_columns(arm: Arm, each: Mapping[str, Simulation]) -> Sequence[Colum
     return columns
 
 
-# ------------------------------------------------------------ measured in time
-
-
-class StepRow(NamedTuple):
-    """A step under one controller in numbers, measured or computed."""
-
-    law: Annotated[str, Quantity("controller", help="controller under which the step was measured")]
-    origin: Annotated[str, Quantity("origin", help="measured on the rig, or computed")]
-    overshoot: Annotated[
-        float,
-        Quantity(
-            "overshoot",
-            "%",
-            3,
-            "beyond the last reference, as a share of the step; below 0 it is not reached",
-            "overshoot_percent",
-        ),
-    ]
-    end: Annotated[
-        float, Quantity("error at the end", "deg", 3, "hub angle less reference at the last sample")
-    ]
-
-
-def step_rows(name: str, found: RunComparison) -> Iterator[StepRow]:
-    """Yield the measured step, and the computed one."""
-    step = found.measured.step
-    end = float(found.measured.reference[-1])
-    for origin, angle in (("measured", found.measured.hub_angle), ("computed", found.hub_angle)):
-        yield StepRow(name, origin, 100 * overshoot(angle, step, end), math.degrees(angle[-1] - end))
-
-
-def measured_blocks(report: ArmReport) -> Iterator[Picture | Table]:
-    """Yield each measured run with the exact loop over it, and both in numbers; nothing where none was measured."""
-    runs = {each: run for each in report.cases if (run := each.run) is not None}
-    if not runs:
-        return
-    found = {each.name: run for each, run in runs.items()}
-    columns = compared_data({each.key: run for each, run in runs.items()})
-    yield picture_block(
-        "sampled_measured", motion.draw_measured_runs.figure(found), data=columns, found=found
-    )
-    rows = [row for name, it in found.items() if it.measured.hub_angle.size for row in step_rows(name, it)]
-    yield record_sheet("sampled_overshoot", rows)
-
-
 def growth_words(each: PageCase, found: Analysis) -> str:
     """State the growth of an unstable loop; after a measured run also when the hub angle shows it."""
     return prose(
@@ -316,24 +269,6 @@ def growth_words(each: PageCase, found: Analysis) -> str:
         measured=each.measured,
         shown=each.departures,
     )
-
-
-def compared_data(found: Mapping[str, RunComparison]) -> Iterator[Column]:
-    """Yield the curves of the picture: a row a sample, measured values taken between their rows."""
-    t = min((it.run.t for it in found.values()), key=len)
-    yield Column("t_s", of=t)
-    for key, it in found.items():
-        measured = it.measured
-        run = it.run
-        for name, at, values in (
-            (f"reference_{key}_rad", measured.t, measured.reference),
-            (f"hub_angle_measured_{key}_rad", measured.t, measured.hub_angle),
-            (f"hub_angle_computed_{key}_rad", run.t, it.hub_angle),
-            (f"root_moment_measured_{key}_N_m", measured.t, measured.root_moment),
-            (f"root_moment_computed_{key}_N_m", run.t, run.at_samples.root_moment),
-        ):
-            if values.size:
-                yield Column(name, of=np.interp(t, at, values))
 
 
 # ------------------------------------------------------------ the gain tuner

@@ -12,6 +12,7 @@ from tfarm.errors import TfarmError
 from tfarm.plots.style import drawn_for
 from tfarm.report import loop_section, response_sections
 from tfarm.report.blocks import PageSection, save_section, upper
+from tfarm.report.measured_section import measured_runs_section
 from tfarm.report.page import ArmReport, has_loop
 from tfarm.report.response_sections import bode_section
 from tfarm.report.sampled_section import sampled_section, tuner_section
@@ -67,6 +68,11 @@ def _of_laws(report: ArmReport) -> bool:
     return bool(report.laws) and not report.arm.is_locked
 
 
+def _of_runs(report: ArmReport) -> bool:
+    """Whether a run was measured under a law of the report."""
+    return report.has_loop and any(each.measured is not None for each in report.cases)
+
+
 def _of_gains(report: ArmReport) -> bool:
     """Whether the page is about both gains of the arm itself."""
     return not report.laws and has_loop(report.arm)
@@ -95,6 +101,7 @@ PIECES = (
     SectionSpec("modes", "modes", response_sections.modes_section, title="Arm and modes"),
     SectionSpec("root loci", "locus", loop_section.locus_section, _in_s, "Root loci"),
     SectionSpec("sampled loop", "sampled", sampled_section, attrgetter("has_loop"), "The sampled loop"),
+    SectionSpec("measured runs", "sampled-measured", measured_runs_section, _of_runs),
     SectionSpec("controllers", "law", loop_section.law_section, _of_laws, "The controller"),
     SectionSpec("gain tuner", "tune", tuner_section, _of_gains, "The gain tuner"),
     SectionSpec(

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from operator import itemgetter
 from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
@@ -40,7 +41,7 @@ from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.models import DesignModel
 from tfarm.synthesis.requirements import MEASURES, NORM, Requirement
 from tfarm.synthesis.search import Search, Worst, sobol
-from tfarm.synthesis.slew_measures import SlewMeasures
+from tfarm.synthesis.slew_measures import NEAR_SETTLING, SlewMeasures
 from tfarm.synthesis.structures import Entry
 from tfarm.synthesis.worst_case import NamedArm
 
@@ -136,7 +137,7 @@ class Goal:
             left = np.flatnonzero(found <= limits)
             if left.size:
                 growth = measures_of(judge, of_laws(entries, left), model).growth
-                penalty = self._penalty([growth / GROWTH_OF_DELAY])
+                penalty = self._penalty([self._of_delay(growth)])
                 found[left] = np.maximum(found[left], scores[left] + penalty)
         return found
 
@@ -163,7 +164,15 @@ class Goal:
     def delay_violations(self, judge: Any, entries: Sequence[Entry]) -> list[Real]:
         """Return the growth (laws,) with the delays: the loop function leaves out that signals are read late."""
         growth = [measures_of(judge, entries, model).growth for model in judge.delayed]
-        return [np.max(growth, axis=0) / GROWTH_OF_DELAY] if growth else []
+        return [self._of_delay(np.max(growth, axis=0))] if growth else []
+
+    def _of_delay(self, growth: Real) -> Real:
+        """Return the violation of a loop with a delay required by the growth of its poles (laws,).
+
+        After a correction it begins with a jump: a mode may grow slowly whatever the law.
+        """
+        least = 5e-4 if self.delays else 0.0
+        return growth / GROWTH_OF_DELAY + np.where(growth >= 0, least, 0.0)
 
     def violations(self, judge: Any, sampled: LoopMeasures) -> list[Real]:
         """Return the violations (laws,) of each requirement of the loops but the delays, of the sampled one first."""
@@ -192,23 +201,28 @@ class Goal:
             found.append(float(plain._penalty(violations)[0]))
         return max(found)
 
-    def simulated_score(self, judge: Any, slew: SlewMeasures, law: AnyLaw) -> float:
-        """Return the score of one law with its slew; `LOST` where it is unstable on the model, or has no figure."""
+    def simulated_score(self, judge: Any, slew: SlewMeasures, law: AnyLaw) -> Real:
+        """Return the score of one law with its slew, and that without the jumps of the settling time (2,).
+
+        `LOST` where it is unstable on the model, or has no figure.
+        """
         score = float(judge.score(law))
         if score >= LOST or not self.by_simulation:
-            return score
+            return np.full(2, score)
         figures = slew.of(law)
-        if _is_of_slew(self.minimised):
-            speed = float(self.value(judge, measures_of(judge, judge.entries(law)))[0])
-            value = figures[self.minimised]
-            if self.minimised.endswith("settling_time_s"):
-                # a tip that does not settle in the longest record: of such laws the fastest is the best
-                value = min(value, 100.0 * speed) + SHARE_OF_SPEED * speed
-            score += float(np.log(max(value, LEAST_SIZE) / speed))
         for each, shift in self.shifted(0):
             if each.measure.of_slew:
                 score += self.weight * max(each.violation(figures[each.name]) + shift, 0.0)
-        return min(score, LOST)
+        if not _is_of_slew(self.minimised):
+            return np.full(2, min(score, LOST))
+        speed = float(self.value(judge, measures_of(judge, judge.entries(law)))[0])
+        values = np.full(2, figures[self.minimised])
+        if self.minimised == "settling_time_s":
+            values[1] = figures[NEAR_SETTLING]
+        if self.minimised.endswith("settling_time_s"):
+            # a tip that does not settle in the longest record: of such laws the fastest is the best
+            values = np.minimum(values, 100.0 * speed) + SHARE_OF_SPEED * speed
+        return np.minimum(score + np.log(np.maximum(values, LEAST_SIZE) / speed), LOST)
 
     @property
     def below_models(self) -> float:
@@ -273,14 +287,15 @@ def _is_of_slew(name: str) -> bool:
     return MEASURES[name].of_slew
 
 
-def simulated_scores(goal: Goal, judges: Sequence[Any]) -> Callable[[AnyLaw], list[float]]:
-    """Return a function from a law to its score on every arm, with its slew."""
+def simulated_scores(goal: Goal, judges: Sequence[Any]) -> Callable[[AnyLaw], Real]:
+    """Return a function from a law to its largest scores on any arm, with its slew (2,)."""
     # modes of a slew that is simulated hundreds of times
     modes = 8
     names = (goal.minimised, *(each.name for each in goal.requirements))
     parts = tuple(each for each in PARTS if any(name.startswith(f"{each}.") for name in names))
     slews = [SlewMeasures(judge.arm, judge.known, judge.chain, modes, parts) for judge in judges]
-    return lambda law: [goal.simulated_score(*pair, law) for pair in zip(judges, slews, strict=True)]
+    pairs = list(zip(judges, slews, strict=True))
+    return lambda law: np.max([goal.simulated_score(*pair, law) for pair in pairs], axis=0)
 
 
 def by_slews(goal: Goal, judges: Sequence[Any], found: Search) -> list[tuple[float, Real]]:
@@ -299,27 +314,31 @@ def by_slews(goal: Goal, judges: Sequence[Any], found: Search) -> list[tuple[flo
     near = near[:most]
     scores = simulated_scores(goal, judges)
     candidates = [x for _, x in found.found] + list(points[:, near].T)
-    ranked = sorted(((max(scores(form.record_at(x))), n) for n, x in enumerate(candidates)))
     low, high = form.box
     chosen: list[Real] = []
-    for _, n in ranked:
+    for n in np.argsort([scores(form.record_at(x))[1] for x in candidates]):
         x = candidates[n]
         if len(chosen) < 3 and all((abs(x - other) > 0.05 * (high - low)).any() for other in chosen):
             chosen.append(x)
-    ends = [polished(goal, judges, form, x, 1.0, 0.5) for x in chosen]
-    pairs = [(max(scores(form.record_at(x))), n, x) for n, x in enumerate(ends)]
-    return [(score, x) for score, _, x in sorted(pairs)] or found.found
+    ends = [polished(goal, judges, form, x, 1.0, 0.5, jumps=False) for x in chosen]
+    return sorted(ends, key=itemgetter(0)) or found.found
 
 
-def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real, size: float, share: float) -> Real:
-    """Return the point of a simplex that begins at x, with the slew simulated on every arm.
+def polished(
+    goal: Goal, judges: Sequence[Any], form: Any, x: Real, size: float, share: float, jumps: bool = True
+) -> tuple[float, Real]:
+    """Return the best score and point of a simplex that begins at x, with the slew simulated on every arm.
 
-    `size` and `share` are of its usual size and its usual number of steps.
+    `size` and `share` are of its usual size and its usual number of steps.  Without `jumps` of the settling time it
+    goes down a slope in their place; the best of its points is that with them.
     """
     scores = simulated_scores(goal, judges)
+    points: list[tuple[float, Real]] = []
 
     def score(at: Real) -> float:
-        return max(scores(form.record_at(at)))
+        found = scores(form.record_at(at)).tolist()
+        points.append((found[0], at.copy()))
+        return float(found[int(not jumps)])
 
     low, high = form.box
     step = 0.02 * size * (high - low)
@@ -327,10 +346,8 @@ def polished(goal: Goal, judges: Sequence[Any], form: Any, x: Real, size: float,
     edges = np.diag(np.where(is_outside, -step, step))
     most = int(60 * share * form.size)
     options = {"initial_simplex": [x, *(x + edges)], "maxfev": most, "adaptive": form.size > 2}
-    done = cast("Any", minimize)(
-        score, x, method="Nelder-Mead", bounds=np.transpose(form.box), options=options
-    )
-    return np.asarray(done.x)
+    cast("Any", minimize)(score, x, method="Nelder-Mead", bounds=np.transpose(form.box), options=options)
+    return min(points, key=itemgetter(0))
 
 
 class LoopValues(NamedTuple):

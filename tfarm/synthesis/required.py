@@ -220,7 +220,8 @@ class RequirementTask:
 
         Where the exact loop of that is unstable, it is the law at the point.
         """
-        better = self._exact(named, judges, found, polished(goal, judges, found.form, x, size, share), goal)
+        _, end = polished(goal, judges, found.form, x, size, share)
+        better = self._exact(named, judges, found, end, goal)
         if np.isfinite(better.violation):
             return better
         return self._exact(named, judges, found, x, goal)
@@ -236,8 +237,8 @@ class RequirementTask:
         # of a violation: what is farther from its limit is not active
         near = 0.1
         is_other = [each.name != DELAY for each in self.requirements]
-        # of simplices to either side, each begun at the end of the one before; one where a slew takes longer
-        sizes = (0.5, -0.5, 0.2) if chosen.search.form.size <= 2 else (0.5,)
+        # of simplices to either side, the second begun at the end of the first; one where a slew takes longer
+        sizes = (0.5, -0.5) if chosen.search.form.size <= 2 else (0.5,)
         value = self._aim(judges, chosen)
         for size in sizes:
             if value < least + SAME:
@@ -258,14 +259,20 @@ class RequirementTask:
     def _aim(self, judges: tuple[Judge, ...], choice: RequiredLaw) -> float:
         """Return the logarithm of the quantity that is minimised, on the models with their slews."""
         plain = Goal((), self.minimised, weights=self.weights)
-        return max(simulated_scores(plain, judges)(choice.law))
+        return float(simulated_scores(plain, judges)(choice.law)[0])
 
     def _exact(
         self, named: Sequence[NamedArm], judges: tuple[Judge, ...], found: Search, x: Real, goal: Goal
     ) -> RequiredLaw:
         """Return the law at x with the exact values of all requirements on each arm."""
         form = found.form
-        coefficients = form.typed(x)
+        coefficients, *others = form.typed(x)
+        if others:
+            scores = simulated_scores(goal, judges)
+            least = scores(form.record_at(x))[0] + SAME
+            # next to a jump the nearest may be on its other side
+            near = (each for each in (coefficients, *others) if scores(form.record_of(each))[0] <= least)
+            coefficients = next(near, coefficients)
         law = form.record_of(coefficients)
         x = form.at(coefficients)
         score = float(Worst(judges).scores(form, x[:, None])[0])
@@ -286,7 +293,7 @@ class RequirementTask:
             if each.name == DELAY and 0 < violations[0, n] < np.inf:
                 # the loop is unstable from there on, though not with every longer delay
                 first = each.limit * (1 - violations[0, n])
-                goal = replace(goal, delays=(*goal.delays, *np.linspace(first, each.limit, 5)[:-1].tolist()))
+                goal = replace(goal, delays=(*goal.delays, *np.linspace(first, each.limit, 5).tolist()))
                 # an active limit is missed by rounding, one between two delays of the models by more
                 if violations[0, n] > 0.01:
                     shifts[0, n] = 0.0
@@ -418,7 +425,7 @@ def _ranked_by_slews(
     No score with a slew is below the `least`: where the best law on the models has it, a quarter of one is enough.
     """
     law = found.form.record_at(found.found[0][1])
-    if max(simulated_scores(goal, judges)(law)) < least + SAME:
+    if simulated_scores(goal, judges)(law)[0] < least + SAME:
         return found, 0.25
     return found._replace(found=by_slews(goal, judges, found)), 1.0
 

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from tfarm.arm import AnyLaw, Arm
+from tfarm.arrays import Real
 from tfarm.assessment.signal_figures import PARTS, LoopRecord, SignalCurve
 from tfarm.case import Case
 from tfarm.dsp import Chain, Scenario, traces
@@ -27,6 +28,8 @@ TIP = "tip_displacement"
 LENGTHS = (1, 6)
 # samples of a longer record: the time of a search
 MOST_SAMPLES = 10_000
+# the figure of `near_settling`
+NEAR_SETTLING = "near_settling_s"
 
 
 @frozen
@@ -60,7 +63,7 @@ class SlewMeasures:
 
         Those but the settling time, and those of parts, are of the first record.
         """
-        names = [name for name, each in MEASURES.items() if each.of_slew]
+        names = [NEAR_SETTLING, *(name for name, each in MEASURES.items() if each.of_slew)]
         case = Case(self.arm, law, self.chain)
         found: dict[str, float] = {}
         impulses = impulses_of(self.known, self.chain, law)
@@ -79,6 +82,7 @@ class SlewMeasures:
                 ]
                 found = {
                     "settling_time_s": np.inf,
+                    NEAR_SETTLING: np.inf,
                     "overshoot": max(0.0, float((y / final).max()) - 1.0) if travel else 0.0,
                     "residual_moment": residuals[0],
                     "residual_raw_moment_rms": residuals[1],
@@ -88,6 +92,9 @@ class SlewMeasures:
                 found |= self._figures(run)
             if settled is not None:
                 found["settling_time_s"] = settled
+                found[NEAR_SETTLING] = near_settling(
+                    t - task.busy_until, abs(y - final), abs(travel), settled
+                )
                 break
         return found
 
@@ -110,3 +117,17 @@ class SlewMeasures:
                 if f"{part}.{key}" in MEASURES:
                     found[f"{part}.{key}"] = np.inf if value is None else abs(value)
         return found
+
+
+def near_settling(t: Real, away: Real, scale: float, settled: float) -> float:
+    """Return the least of t + (settled - t) min(1, v/w) over times `t` (n,) up to that at which a signal settles [s].
+
+    v is by how much the largest deviation from t on is above the band, in bands: a time of settling that jumps where a
+    peak leaves the band goes up along a slope of width w.
+    """
+    width = 0.2
+    largest = np.maximum.accumulate(away[::-1])[::-1]
+    excess = largest / (SETTLING_BAND * (scale or float(away.max()))) - 1
+    is_before = (t >= 0) & (t < settled)
+    left = settled - t[is_before]
+    return settled + float((left * np.minimum(0, excess[is_before] / width - 1)).min(initial=0.0))

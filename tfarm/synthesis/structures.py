@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -146,12 +147,12 @@ class Structure:
         """Return all coefficients by name, the fixed ones first."""
         return self.fixed | dict(zip(self.names, free, strict=True))
 
-    def typed(self, x: Real) -> list[float]:
-        """Return the coefficients at x (n,), gains at the hub to `TYPED_DIGITS`."""
+    def typed(self, x: Real) -> list[list[float]]:
+        """Return the coefficients at x (n,), gains at the hub to `TYPED_DIGITS`: the nearest, then all next to them."""
         found = self.coefficients(x).tolist()
-        if self.name == TWO_GAINS:
-            return [float(f"{value:.{TYPED_DIGITS}g}") for value in found]
-        return found
+        if self.name != TWO_GAINS:
+            return [found]
+        return [list(each) for each in product(*map(_typed, found))]
 
     def record_at(self, x: Real) -> AnyLaw:
         """Return the law at x (n,), as a record."""
@@ -193,6 +194,13 @@ class Structure:
             bounds = (low, bound) if end else (bound, high)
             free[place] = each._replace(bounds=bounds)
         return replace(self, free=tuple(free))
+
+
+def _typed(value: float) -> list[float]:
+    """Return the numbers of `TYPED_DIGITS` to either side, the nearer first."""
+    last = 10.0 ** (np.floor(np.log10(abs(value) or 1.0)) + 1 - TYPED_DIGITS)
+    ends = [float(f"{way(value / last) * last:.{TYPED_DIGITS}g}") for way in (np.floor, np.ceil)]
+    return sorted(ends, key=lambda end: abs(end - value))
 
 
 def structure_of(
