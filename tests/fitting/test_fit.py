@@ -15,8 +15,9 @@ from tests.fitting.planted import chi_squared_at, elements_response, judged, jud
 from tests.shared import refusal, thinned
 from tests.shell import answer, refused, run
 from tfarm.fitting import solve
+from tfarm.fitting.assumptions import is_named
 from tfarm.fitting.data import noise_of
-from tfarm.fitting.fit import fit, is_named
+from tfarm.fitting.fit import fit
 from tfarm.fitting.model import RingMode, eigenvalue, mode_of
 
 LAB = tfarm.load("sasaki2012-lab")
