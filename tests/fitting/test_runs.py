@@ -25,8 +25,9 @@ from tfarm.dsp.simulate import LinearLoop, Simulator, references_of
 from tfarm.fitting.fit import fit
 from tfarm.fitting.model import Problem, free_parameters, with_run_numbers
 from tfarm.fitting.posterior import load_posterior
-from tfarm.fitting.run_model import chance_of_white, fit_run
+from tfarm.fitting.run_model import fit_run
 from tfarm.fitting.runs import Run
+from tfarm.fitting.whiteness import chance_of_white
 from tfarm.plots.frequency import fit_runs
 from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import fit_section

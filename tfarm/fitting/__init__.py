@@ -13,6 +13,7 @@
 `overlay`: a measured response compared with the exact one, mode by mode.
 `model`: free numbers of an arm, and the residuals that they leave.
 `run_numbers`: free numbers of the chain of runs.
+`whiteness`: whether what a model leaves of a record is noise.
 `solve`: the search for the least sum of squares.
 `intervals`: intervals of the numbers, and the directions that the data leave open.
 `fit`: the fitted arm, and arms drawn from its posterior.

@@ -258,8 +258,10 @@ class Fit(RunResults):
         known = sum(each.identified for each in self.parameters)
         share = f"reduced chi-squared = {self.chi_squared / max(self.freedom, 1):.3g}"
         if self.problem.runs and (self.is_explained or not self.has_known_noise):
-            white = "white" if self.is_explained else "not white"
-            share = f"residuals are {white} (chance {self.chance_of_white:.2g})"
+            white = "white and independent of the input"
+            if not self.is_explained:
+                white = "no white noise that is independent of the input"
+            share = f"residuals are {white} (chance {self.chance_of_noise:.2g})"
         tests = {
             None: "noise estimated from the residuals: the model cannot be tested",
             True: f"model not rejected: {share}",

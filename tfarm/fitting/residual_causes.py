@@ -29,7 +29,8 @@ from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Real
 from tfarm.digits import general
 from tfarm.fitting.decays import NOT_WHITE
-from tfarm.fitting.run_model import FitRun, chance_of_white
+from tfarm.fitting.run_model import FitRun
+from tfarm.fitting.whiteness import chance_of_white
 from tfarm.records import frozen
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Percent, Quantity

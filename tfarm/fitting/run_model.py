@@ -27,7 +27,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
-from scipy.special import chdtrc
 
 from tfarm.arm import AT_HUB, Arm
 from tfarm.arm.chain import Chain, Sampling
@@ -443,7 +442,7 @@ def fit_run(arm: Arm, run: Run, chain: Chain) -> FitRun:
     known = tuple(name in run.sigma for name in run.names)
     if run.law is not None and run.law.period is not None:
         chain = replace(chain, sampling=replace(chain.sampling, period=run.law.period))
-    is_moving = run.law is None if run.initial is None else run.initial == "free"
+    is_moving = run.initial != "rest"
     found = FitRun(run, chain, modes_at_period(arm, run.period), tuple(sigma), known, is_moving)
     # raises for a period that is no part of the controller's
     assert found.ratio
@@ -463,24 +462,3 @@ def at_period(chain: Chain, period: float) -> Chain:
     sampling = chain.sampling
     delay = sampling.delay_samples * sampling.period / period
     return replace(chain, sampling=replace(sampling, period=period, delay_samples=delay))
-
-
-def chance_of_white(residuals: Real) -> float:
-    """Return the probability that white noise has autocorrelations, or a line of its spectrum, as large as these.
-
-    By Ljung and Box (1978) over 20 lags, and by Fisher (1929) for the largest line of the periodogram; twice the lesser
-    of the two.
-    """
-    e = residuals - residuals.mean()
-    n = e.size
-    lags = np.arange(1, min(20, n // 5) + 1)
-    total = float(e @ e)
-    if total == 0 or not lags.size:
-        return 1.0
-    r = np.array([e[lag:] @ e[:-lag] for lag in lags.tolist()]) / total
-    by_lags = float(chdtrc(lags.size, n * (n + 2) * (r**2 / (n - lags)).sum()))
-    lines = abs(np.fft.rfft(e)[1 : (n + 1) // 2]) ** 2
-    share = float(lines.max() / lines.sum())
-    # the first term of Fisher's series: an upper bound, and the whole of it where it is small
-    by_line = min(1.0, lines.size * (1 - share) ** (lines.size - 1))
-    return min(1.0, 2 * min(by_lags, by_line))

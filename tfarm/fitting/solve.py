@@ -30,8 +30,8 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.fitting.data import CONFIDENCE, in_parts
 from tfarm.fitting.model import Problem, penalize
-from tfarm.fitting.run_model import chance_of_white
 from tfarm.fitting.run_numbers import with_disturbance
+from tfarm.fitting.whiteness import chance_of_independent, chance_of_white
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency
@@ -210,6 +210,17 @@ class Solution:
             found += map(chance_of_white, residuals.reshape(len(each.sigma), -1))
         return min(1.0, len(found) * min(found, default=1.0))
 
+    @cached_property
+    def chance_of_noise(self) -> float:
+        """The probability of residuals of the runs so far from white ones that do not depend on what drove them."""
+        found: list[float] = []
+        of_runs = self.parts[len(self.problem.responses) :]
+        for each, residuals in zip(self.problem.runs, of_runs, strict=True):
+            driving = each.run.driving_changes
+            found += (chance_of_independent(e, driving) for e in residuals.reshape(len(each.sigma), -1))
+        independent = min(1.0, len(found) * min(found, default=1.0))
+        return min(1.0, 2 * min(self.chance_of_white, independent))
+
     @property
     def misfit(self) -> float:
         """Minus ln of the likelihood, but for a constant: with the noise, where that is from the residuals."""
@@ -238,7 +249,9 @@ def best_solution(problem: Problem, is_enough: Callable[[Solution], bool | None]
         else:
             found.append(rescale_noise(nearest_minimum(*start_by(problem, draws, shares))))
         best = min(found, key=lambda each: each.misfit)
-        if best.converged and (is_enough or is_explained)(best):
+        is_done = best.converged and (is_enough or is_explained)(best)
+        # a third search on runs that no noise explains takes long
+        if is_done or (problem.runs and len(found) == 2):
             break
     # a search on runs has begun there already
     if open_axes(best.jacobian).size and not problem.runs:
@@ -381,14 +394,14 @@ def open_axes(jacobian: Real, deviation: float = OPEN_DEVIATION) -> Real:
 def is_explained(one: Solution) -> bool | None:
     """Return whether noise alone gives such residuals often enough; None where nothing tests that.
 
-    A sum of squares tests it where the size of all noise is known, and of runs it is white.
+    A sum of squares tests it where the size of all noise is known; of runs it is white, and independent of the input.
     """
     # the probability of a sum of squares by noise alone
     is_small = chdtrc(max(one.freedom, 1), one.chi_squared) > 1e-6
     if one.has_known_noise and not is_small:
         return False
     if one.problem.runs:
-        return one.chance_of_white > LEAST_CHANCE
+        return one.chance_of_noise > LEAST_CHANCE
     return True if one.has_known_noise else None
 
 
