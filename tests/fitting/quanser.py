@@ -26,7 +26,7 @@ PREDICTED = ("20deg", "neg_30deg", "neg_10deg", "5deg")
 # N m/rad: root moment over the deflection angle of the gauge (lqg.toml)
 STIFFNESS = 39.957
 MISS = {"hub_angle": np.radians(1.0), "root_moment": np.radians(0.5) * STIFFNESS}
-# of the least squares next to the maker's numbers
+# of the least squares next to the maker's numbers, without a bias, each hub at the start where it was measured
 VALUES = {
     "hub.friction": 2.79466,
     "motor.torque_constant": 0.0949514,
