@@ -43,7 +43,7 @@ from tfarm.dsp.sensed import sensed_plant
 from tfarm.dsp.simulate import LinearLoop, quantisers, references_of
 from tfarm.errors import ParameterError, require
 from tfarm.fitting.held import modes_at_period
-from tfarm.fitting.runs import Run
+from tfarm.fitting.runs import Run, from_rest
 from tfarm.records import frozen
 
 DRIVE_DELAY = "drive.delay"
@@ -434,7 +434,13 @@ class RunLoop:
 
 
 def fit_run(arm: Arm, run: Run, chain: Chain) -> FitRun:
-    """Return a run as a fit begins with it: deviations that are not known a tenth of their signal's."""
+    """Return a run as a fit begins with it: deviations that are not known a tenth of their signal's.
+
+    Under a controller with a reference of the hub's angle that is about its first measured value: an observer of the
+    controller had come to rest there.
+    """
+    if arm.has_rigid_mode:
+        run, _ = from_rest(run)
     sigma = []
     for name, values in run.outputs.items():
         usual = 0.1 * float(np.std(values)) or 1.0
