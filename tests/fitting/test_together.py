@@ -9,7 +9,9 @@ import pytest
 import tfarm
 from tests.fitting.three_rulers import CHAIN, DELAY, GAIN, PERIOD, fit_of, open_loop, predictions, ruler, started
 from tests.shared import refusal
+from tests.shell import answer, refused
 from tfarm.arm.chain import Chain, Sampling
+from tfarm.arm.writing import to_toml
 from tfarm.fitting.fit import save_fit
 from tfarm.fitting.posterior import load_posterior
 from tfarm.fitting.together import fit_together
@@ -93,3 +95,31 @@ def test_refusals(change, words):
     of = {"arms": [started(arm) for arm in arms], "free": KEYS, "runs": [[run] for run in runs]}
     of |= {"shared": ["hub.inertia"], "chain": CHAIN} | change
     assert words in str(refusal(fit_together, of.pop("arms"), of.pop("free"), **of))
+
+
+def test_the_command_fits_arms_together(tmp_path, capsys):
+    arms, runs, _ = two_rulers()
+    for arm, run in zip(arms, runs, strict=True):
+        (tmp_path / f"{arm.name}.toml").write_text(to_toml(started(arm)))
+        columns = np.column_stack([run.t, run.input, *run.outputs.values()])
+        header = ",".join(["t", "hub_torque", *run.outputs])
+        np.savetxt(tmp_path / f"{arm.name}.csv", columns, delimiter=",", header=header, comments="")
+    one, other = (tmp_path / arm.name for arm in arms)
+    words = ["fit", f"{one}.toml", "--run", f"{one}.csv", "--with", f"{other}.toml={other}.csv", "--period", PERIOD]
+    words += ["--free", "link.youngs_modulus,link.damping,hub.inertia,hub.friction,drive.gain,drive.delay"]
+    words += [
+        "--shared",
+        "hub.inertia,hub.friction,drive.gain,drive.delay",
+        "--covariance",
+        "--save",
+        tmp_path / "one.toml",
+    ]
+    found = answer(capsys, *map(str, words))
+    numbers = {each["key"]: each["value"] for each in found["parameters"]}
+    assert numbers["drive.delay"] == pytest.approx(DELAY, rel=0.02)
+    assert numbers["link.youngs_modulus:ruler-180"] == pytest.approx(205e9, rel=0.01)
+    saved = tfarm.load(tmp_path / "ruler-180-fitted.toml")
+    assert saved.hub.inertia == numbers["hub.inertia"]
+    assert "--with" in refused(
+        capsys, "fit", f"{one}.toml", "--run", f"{one}.csv", "--free", "hub.inertia", "--shared", "x"
+    )

@@ -29,6 +29,7 @@ from tfarm.cli.options import (
     record_of_options,
     refuse,
     runs_of_options,
+    together_of_options,
 )
 from tfarm.cli.output import emit, emit_loop, emit_record
 from tfarm.cli.progress import advance, print_line
@@ -294,6 +295,7 @@ def fit(
     initial: Annotated[str | None, typer.Option(metavar="rest|free")] = None,
     covariance: bool = False,
     read: Any = runs_of_options,
+    together: Any = together_of_options,
     chain: Any = chain_of_options,
     save: File = None,
     png: Png = None,
@@ -332,19 +334,23 @@ def fit(
         refuse({"initial": initial, **chain.keywords}, "is of runs: give --run too")
     for each in measured:
         ratio.check_unit(subject, each)
-    found = tfarm.fit(
-        subject,
-        measured,
-        [key.strip() for key in free.split(",") if key.strip()],
-        runs=runs,
-        chain=chain(arm),
-        rings=[model.mode_of(text) for text in mode or []],
-        profile=not covariance,
-        progress=advance,
-        start={key: value for key, (value,) in start or []},
-        bounds=dict(bounds or []),
-        priors=dict(prior or []),
-    )
+    others, more, shared = together(read, theory)
+    keys = [key.strip() for key in free.split(",") if key.strip()]
+    of: Any = {
+        "chain": chain(arm),
+        "profile": not covariance,
+        "progress": advance,
+        "start": {key: value for key, (value,) in start or []},
+        "bounds": dict(bounds or []),
+        "priors": dict(prior or []),
+    }
+    if others:
+        refuse({"data": data, "mode": mode, "report": report}, "is of one arm: leave it out, or --with")
+        more = [[replace(each, initial=cast("Any", initial)) for each in own] for own in more]
+        found = tfarm.fit_together([subject, *others], keys, runs=[runs, *more], shared=shared, **of)
+    else:
+        rings = [model.mode_of(text) for text in mode or []]
+        found = tfarm.fit(subject, measured, keys, runs=runs, rings=rings, **of)
     if save is not None:
         save_fit(found, save)
     if report:

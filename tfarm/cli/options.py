@@ -371,6 +371,36 @@ def runs_of_options(
     return runs_of(run or [], arm, signal or [], decimate)
 
 
+def together_of_options(
+    read: Callable[..., Any],
+    theory: Theory | None,
+    *,
+    others: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--with", metavar="ARM=FILE", help="another arm of the fit and its run, FILE or FILE=LAW.toml"
+        ),
+    ] = None,
+    shared: Annotated[
+        str, typer.Option("--shared", metavar="KEY,KEY", help="free numbers that all arms have in common")
+    ] = "",
+) -> "tuple[list[Arm], list[list[Run]], list[str]]":
+    """Return the other arms of a fit, their runs as `read` reads one, and the keys of shared numbers."""
+    found: dict[str, tuple[Arm, list[Run]]] = {}
+    for text in others or []:
+        name, _, file = text.partition("=")
+        require(
+            name and file, "--with", text, "write ARM=FILE, or ARM=FILE=LAW.toml of a record in closed loop"
+        )
+        if name not in found:
+            found[name] = load_arm(load_tables(name), theory), []
+        arm, runs = found[name]
+        runs += read(arm, run=[file])
+    require(found or not shared, "--shared", shared, "is of several arms: give --with too")
+    keys = [key.strip() for key in shared.split(",") if key.strip()]
+    return [arm for arm, _ in found.values()], [runs for _, runs in found.values()], keys
+
+
 def weight_entry(text: str) -> tuple[Any, ...]:
     """Return numerator and denominator of NUM/DEN, coefficients in descending powers of s; of NUM over 1."""
     num, _, den = text.partition("/")

@@ -33,6 +33,7 @@ PATHS = (
     "--list",
     "--posterior",
     "--run",
+    "--with",
     "--before",
 )
 # NAME=VALUE, one a name
