@@ -312,6 +312,9 @@ def test_noise_of_sensors_that_the_controller_reads_is_known_by_its_residuals(in
     assert run.through_loop == inside
     assert_found(found, PLANTED)
     assert found.chance_of_white > 0.01
+    (curves,) = found.run_curves
+    # of the output: what the noise does to the arm is in it
+    assert (np.std(curves.computed - curves.measured, axis=1)[2] > 1.3 * SIGMA["root_moment"]) == inside
     for name, sigma in zip(run.run.names, run.sigma, strict=True):
         assert sigma == pytest.approx(SIGMA[name], rel=5 / math.sqrt(2 * run.run.count))
 
