@@ -30,9 +30,11 @@ from tests.plausible.arms import draw
 from tfarm.arm import Arm, HubFeedback
 from tfarm.case import Case
 from tfarm.dsp import Chain, Sampling, Simulator, scenario
+from tfarm.dsp.pulse import pulse_transfer
 from tfarm.ensemble.space import space_of
 from tfarm.exact.appendix import Appendix
 from tfarm.exact.outputs import output
+from tfarm.fitting.runs import Run as MeasuredRun
 from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.loci import open_loop, reduced_locus
@@ -352,6 +354,22 @@ def studies():
     yield Row("study of modes, two processes", n, taken[2] / n, taken[1] / taken[2], "as fast as one")
 
 
+def fits(n=50_000, period=0.01):
+    """A fit of five numbers to a record of an open loop, with profiles."""
+    arm, rng = unseen(LAB).arm, np.random.default_rng(5)
+    u = rng.choice([-0.5, 0.5], n // 10).repeat(10)
+    sampling, sigma = Sampling(period=period, delay_samples=0.7), {"hub_angle": 2e-3, "root_moment": 0.02}
+    exact = pulse_transfer(arm, tuple(sigma), sampling).held_response(u)
+    noise = rng.standard_normal(exact.shape)
+    outputs = {name: y + s * e for (name, s), y, e in zip(sigma.items(), exact, noise, strict=True)}
+    free = ["link.youngs_modulus", "hub.inertia", "link.damping", "drive.delay", "gain:root_moment"]
+    start = {"link.youngs_modulus": 1.2 * arm.link.youngs_modulus, "hub.inertia": 0.8 * arm.hub.inertia}
+    run = MeasuredRun(period=period, outputs=outputs, input=u)
+    began = time.process_time()
+    tfarm.fit(arm, [], free, runs=[run], chain=Chain(sampling=Sampling(period=period)), start=start)
+    yield Row(f"fit of five numbers from a run of {n} samples", 1, time.process_time() - began)
+
+
 def of_process(*words, **environment):
     """Processor time of a Python process with these arguments and environment."""
 
@@ -381,7 +399,7 @@ def commands():
 def main(path):
     """Measure, print, keep."""
     rows = []
-    for row in itertools.chain(*(group() for group in (responses, spectra, loops, loci, studies, commands))):
+    for row in itertools.chain(*(group() for group in (responses, spectra, loops, loci, studies, fits, commands))):
         rows.append(row)
         ratio = "" if row.ratio is None else f", {row.ratio:.3g} x {row.to}"
         error = "" if row.error is None else f", largest error {row.error:.1e}"

@@ -10,7 +10,7 @@ from tfarm.arm import Section, load, to_toml
 from tfarm.arm.materials import materials
 from tfarm.arm.schema import arm_of_table
 from tfarm.errors import ParameterError
-from tfarm.fitting.fit import is_named
+from tfarm.fitting.assumptions import is_named
 
 METALS = ("steel", "spring steel", "aluminium 6061", "titanium 6Al-4V", "brass")
 LAMINATES = ("CFRP UD 0", "GFRP")

@@ -70,12 +70,19 @@ class Plant:
 
     def pushed(self, duration, quiet):
         """The states after a smooth push of that duration [s] and a time of rest."""
-        pieces = 100
+        return held(self.A, self.B, quiet)[0] @ self._after(np.hanning, duration)
+
+    def settled(self, duration):
+        """The states under a unit input that has come up smoothly in that duration [s]: of modes, those at rest."""
+        return self._after(lambda pieces: (1 - np.cos(np.pi * np.arange(pieces) / pieces)) / 2, duration)
+
+    def _after(self, shape, duration, pieces=100):
+        """The states after an input of that shape, from rest."""
         whole, part = held(self.A, self.B, duration / pieces)
         x = np.zeros(len(self.A))
-        for each in np.hanning(pieces):
+        for each in shape(pieces):
             x = whole @ x + part * each
-        return held(self.A, self.B, quiet)[0] @ x
+        return x
 
 
 def _hang(loop, tip, mass, body):

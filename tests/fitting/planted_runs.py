@@ -5,14 +5,16 @@
 
 Random arms under torque or current, whose records come from `tests.fitting.elements_in_time`: hold, dead time of any
 fraction, gain and bias of the drive, analog filter, offsets, noise and encoder steps of the sensors.  The kinds are
-open (some are pushed before the record), closed (at rest at the start), pushed (closed, in motion at the start), and of
-a wrong model joint (one that moves mode 1 by 5 %) and elastic (a payload with a mode of its own below mode 3).
+open (under its bias before the record, and some are pushed), closed (from rest), pushed (closed, in motion at the
+start), and of a wrong model joint (one that moves mode 1 by 5 %) and elastic (a payload with a mode of its own below
+mode 3).
 
 Two to five numbers are free, each started up to 30 % off.  No fit may end above the sum of squares of a search from
 the truth, nominal 95 % intervals are counted, and so are right models that are rejected; wrong ones have to be.
 
 Derivatives of the noiseless records by the elements themselves give the shift of the numbers by shorter elements, in
-standard deviations ("bias"), and chi-squared of a wrong model in excess of its freedom ("excess").
+standard deviations ("bias"), and chi-squared of a wrong model in excess of its freedom ("excess"), as far as both are
+linear: numbers that may go farther explain more of a wrong model's record.
 """
 
 import json
@@ -70,6 +72,7 @@ class Planted:
     names: tuple
     corner: float  # of the analog filter, rad/s
     push: tuple  # duration, rest [s], and factor on the states
+    settling: float | None  # s, in which the bias has come up before the record; None where it begins with it
     run: Run
 
     def plant_at(self, values, modes=MODES):
@@ -94,7 +97,9 @@ class Planted:
         if "drive.gain" in values:
             drive = replace(drive, gain=values["drive.gain"] / torque_constant(self.arm))
         ideal = replace(self.computer, step={}, offset={})
-        start = more.pop("start", self.push[2] * plant.pushed(*self.push[:2]))
+        start = more.pop("start", None)
+        if start is None:
+            start = self.push[2] * plant.pushed(*self.push[:2]) + self.drive.bias * settled(plant, self.settling)
         read, _, _ = simulate(plant, drive, ideal, start=start, **more)
         return (read / deviations(self.computer, self.names)[:, None, None]).reshape(-1, read.shape[2])
 
@@ -159,6 +164,11 @@ def deviations(computer, names):
     """Of the noise of each signal, its steps included (signals,)."""
     squares = [computer.noise[name] ** 2 + computer.step.get(name, 0.0) ** 2 / 12 for name in names]
     return np.sqrt(squares)
+
+
+def settled(plant, settling):
+    """The states by a unit of bias at the start of a record."""
+    return 0 * plant.B if settling is None else plant.settled(settling)
 
 
 def torque_constant(arm):
@@ -250,7 +260,8 @@ def drawn(rng, kind):
     )
     # of the record, of a push before it, and of a bias: each its share
     push = 2 * math.pi / w1 * rng.uniform(0.3, 1.5), (3 + 5 * rng.random()) * period
-    pushed = np.c_[0 * plant.B, plant.pushed(*push), 0 * plant.B]
+    settling = None if entries else 10 * math.pi / w1
+    pushed = np.c_[0 * plant.B, plant.pushed(*push), settled(plant, settling)]
     if entries and not is_stable(plant, drive, replace(computer, count=SETTLED), pushed[:, 1]):
         return None
     alone = simulate(plant, drive, computer, start=pushed, factor=np.eye(3)[0], bias=np.eye(3)[2])[0]
@@ -258,15 +269,16 @@ def drawn(rng, kind):
     is_moving = kind == "pushed" or (not entries and rng.random() < 0.5)
     factor = rng.uniform(0, 0.5) * record / by_push if is_moving else 0.0
     drive = replace(drive, bias=rng.uniform(-0.5, 0.5) * record / by_bias)
-    whole = simulate(plant, drive, computer, start=factor * pushed[:, 1])[0][..., 0]
+    start = pushed @ [0.0, factor, drive.bias]
+    whole = simulate(plant, drive, computer, start=start)[0][..., 0]
     computer = with_sensors(rng, computer, names, whole)
-    seen, u, _ = simulate(plant, drive, computer, start=factor * pushed[:, 1], rng=rng)
+    seen, u, _ = simulate(plant, drive, computer, start=start, rng=rng)
     measured = dict(zip(names, seen[..., 0], strict=True))
     sigma = dict(zip(names, deviations(computer, names).tolist(), strict=True)) if rng.random() < 0.5 else {}
     recorded = u[:, 0] if law is None or rng.random() < 0.5 else None
     run = Run(period=period, outputs=measured, input=recorded, references=computer.references, law=law, sigma=sigma)
     start = {key: value * (1 + rng.uniform(-OFF, OFF)) for key, value in truth.items()}
-    return Planted(arm, other, body, truth, start, drive, computer, names, corner, (*push, factor), run)
+    return Planted(arm, other, body, truth, start, drive, computer, names, corner, (*push, factor), settling, run)
 
 
 def is_stable(plant, drive, computer, start):

@@ -16,8 +16,9 @@ from tests.fitting.planted import chi_squared_at, elements_response, judged, jud
 from tests.shared import refusal, thinned
 from tests.shell import answer, refused, run
 from tfarm.fitting import solve
+from tfarm.fitting.assumptions import is_named
 from tfarm.fitting.data import noise_of
-from tfarm.fitting.fit import fit, is_named
+from tfarm.fitting.fit import fit
 from tfarm.fitting.intervals import profile_end
 from tfarm.fitting.model import RingMode, eigenvalue, mode_of
 
@@ -110,6 +111,7 @@ def test_a_profile_that_is_not_monotonic_ends_at_its_level_on_its_side(waves, si
     """The one residual x + a sin(b x) has its level at several x."""
     size, speed = waves
     problem = SimpleNamespace(
+        runs=(),
         bounds=(np.array([-9.0]), np.array([9.0])),
         residuals=lambda x: x + size * np.sin(speed * x),
     )

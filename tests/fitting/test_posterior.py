@@ -305,3 +305,17 @@ def test_the_scatter_between_records(scatter):
     low, high = several.intervals[E]
     assert low < LAB.link.youngs_modulus < high
     assert fit(LAB, records(moduli[:2]), free=[E], profile=False).records is None
+
+
+def test_draws_of_a_posterior_with_variances_far_apart():
+    """A number that is not determined next to one known to 6 digits: each is drawn with its own deviation."""
+    covariance = np.diag([1e-12, 0.0, 0.2])
+    numbers = [{"key": key, "value": 2.0, "low": None, "high": None, "size": 0.0} for key in "abc"]
+    own = {"format": "tfarm posterior 1", "arm": "x", "numbers": numbers, "not_determined": ["b"]}
+    # turned a little, so that the axes are none of the coordinates
+    turn = np.linalg.qr(np.eye(3) + 1e-4 * np.random.default_rng(1).standard_normal((3, 3)))[0]
+    covariance = turn @ covariance @ turn.T
+    posterior = Posterior(**own, covariance=((covariance + covariance.T) / 2).tolist())
+    drawn = np.log(posterior.with_all_determined.draws({}, np.random.default_rng(2).standard_normal((4000, 3))) / 2.0)
+    along = np.std(drawn @ turn, axis=0)
+    np.testing.assert_allclose(along, [1e-6, 1.0, np.sqrt(0.2)], rtol=0.1)

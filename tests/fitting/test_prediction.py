@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 import tfarm
+from tests.fitting import quanser
 from tests.shared import refusal
 from tests.shell import answer, refused
 from tfarm.arm.chain import Actuator, Chain, Converters, Sampling
@@ -16,6 +17,7 @@ from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulator
 from tfarm.fitting.posterior import Posterior, PosteriorNumber
 from tfarm.fitting.residual_causes import cross_correlation
+from tfarm.fitting.run_files import load_run
 from tfarm.fitting.runs import Run
 
 T = 0.01
@@ -194,6 +196,22 @@ def test_the_correlation_has_its_lag_and_its_bound():
     # of one lag: 1 % beyond the bound
     beyond = [cross_correlation(each, x[:400])[0] > 1.6 for each in rng.standard_normal((40, 400))]
     assert np.mean(beyond) < 0.1
+
+
+# ------------------------------------------------------------ a real rig
+
+
+@pytest.mark.parametrize(("controller", "hub", "deflection"), [("lqg", 0.42, 0.18), ("hinf", 1.13, 0.39)])
+def test_two_runs_of_a_real_rig_are_predicted_from_others(controller, hub, deflection):
+    """Fitted to runs of other steps: far better than the maker's numbers in the gauge, and not free of dry friction."""
+    (found,) = quanser.predictions([load_run(quanser.RIG / f"{controller}.toml").run], quanser.VALUES)
+    rows = quanser.in_degrees(found)
+    assert rows["predicted"] == pytest.approx([hub, deflection], abs=0.01)
+    assert rows["predicted"][1] < 0.7 * rows["before the fit"][1]
+    assert rows["predicted"][0] < 0.3 * rows["reference itself"][0]
+    # the bending stiffness is not what these runs show
+    assert "root_moment" not in found.counts_for
+    assert not found.residuals[0].is_noise
 
 
 # ------------------------------------------------------------ refusals, command

@@ -354,7 +354,8 @@ def test_a_decimation_that_would_be_wrong_is_refused():
 def test_a_measured_run_of_a_law_file_names_its_columns(tmp_path):
     written(tmp_path / "a.csv", ("t", "ref [deg]", "enc"), T, X, Y)
     (tmp_path / "law.toml").write_text(
-        '[law.hub_rate]\ngain = 1.0\n[measured]\nfile = "a.csv"\nsignals = ["reference:hub_angle=ref", "hub_angle=enc*-0.5"]\n'
+        '[law.hub_rate]\ngain = 1.0\n[measured]\nfile = "a.csv"\n'
+        'signals = ["reference:hub_angle=ref", "hub_angle=enc*-0.5"]\n'
     )
     found = load_run(tmp_path / "law.toml").run
     assert found.t == pytest.approx(T - 1.0, abs=1e-15)

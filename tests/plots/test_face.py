@@ -22,6 +22,7 @@ from tfarm import Law
 from tfarm.digits import plain
 from tfarm.dsp import Chain, ReferenceShaping
 from tfarm.fitting.data import Measured
+from tfarm.fitting.runs import Run
 from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.loci import reduced_locus
 from tfarm.loop.nyquist import compress_radius
@@ -49,6 +50,7 @@ AXES = {
     "loop": 2,
     "measured_response": 3,
     "modes": 3,
+    "prediction": 2,
     "reference": 2,
     "slew": 3,
     "step": 4,
@@ -95,6 +97,7 @@ def records(tmp_path_factory):
         "sensitivity": lambda: [tfarm.loop_function(LAB, LAW)],
         "gain_regions": lambda: [plane(), sampled_map(tfarm.sampled(LAB, LAW, count=8).verdict.loop, K1, K2)],
         "sketch": lambda: [LAB],
+        "prediction": lambda: [tfarm.predict(LAB, pulse_run())],
         "tuned_gain": lambda: [tfarm.tune(LAB, Plan(trials=1))],
         "slew": lambda: [LAB, tfarm.simulate(LAB, LAW, duration=2.0, count=8, between=4)],
         **dict.fromkeys(("study", "study_band", "study_scatter"), lambda: [study()]),
@@ -110,6 +113,14 @@ def records(tmp_path_factory):
         "gain_map of a rig": lambda: [tfarm.map(rig, np.linspace(-1, 4, 40) * law.K1, np.linspace(-1, 1.5, 41) * unit)],
     }
     return cache(lambda name: makers[name]())
+
+
+def pulse_run():
+    """A pulse of torque that turns the hub, as a rig might have it."""
+    t = 0.01 * np.arange(100)
+    torque = np.where(t < 0.2, 0.5, 0.0)
+    outputs = {"hub_angle": 0.1 * np.minimum(t, 0.2), "root_moment": 0.1 * np.sin(70 * t)}
+    return Run(period=0.01, outputs=outputs, input=torque)
 
 
 def sweep():

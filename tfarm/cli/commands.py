@@ -314,7 +314,7 @@ def fit(
     bounds: bounds of a number
     prior: prior mean and deviation
     mode: mode of a ring-down: 1=2.52hz,0.006, with standard deviations 1=2.52hz~0.01,0.006~0.001
-    initial: motion of the runs at their first sample; by default free in open loop, rest under a controller
+    initial: motion of the runs at their first sample; by default free
     covariance: intervals by the covariance alone, without profiles
     save: write the fitted arm to this TOML file, with the chain of its runs
     report: write the pages of the fitted arm

@@ -307,6 +307,10 @@ class LinearLoop:
         row = self.plant.outputs.index("hub_angle")
         return kernel.model_of(self.plant, kept, self.chain.sampling, 0, row)
 
+    @cached_property
+    def _table(self) -> Real:
+        return system_matrix(self.law)
+
     def input(self, references: Real, disturbance: Real) -> Real:
         """Return the input (n,) from rest under references (n, columns), and a disturbance (n,) on the hub."""
         chain = self.chain
@@ -330,7 +334,7 @@ class LinearLoop:
             state,
             kernel.Forcing(np.zeros(n), disturbance, 0.0),
             electronics,
-            system_matrix(self.law),
+            self._table,
             back_calculation(self.law, electronics.quantisers[kernel.DAC, 1:]),
             sources,
             references,
@@ -339,7 +343,7 @@ class LinearLoop:
 
     def input_alone(self, errors: Real) -> Real:
         """Return the input (n,) of the law alone, from rest, of errors (n, columns)."""
-        return np.asarray(kernel.law_outputs(system_matrix(self.law), errors))
+        return np.asarray(kernel.law_outputs(self._table, errors))
 
 
 def largest_moment(arm: Arm) -> float:

@@ -12,10 +12,14 @@
 `residual_causes`: what a prediction leaves, and the single changes that would remove it.
 `overlay`: a measured response compared with the exact one, mode by mode.
 `model`: free numbers of an arm, and the residuals that they leave.
+`run_numbers`: free numbers of the chain of runs.
+`whiteness`: whether what a model leaves of a record is noise.
 `solve`: the search for the least sum of squares.
 `intervals`: intervals of the numbers, and the directions that the data leave open.
 `fit`: the fitted arm, and arms drawn from its posterior.
 `result_rows`: rows of a fit, of its responses and of its runs.
+`together`: one fit of several arms with numbers that they share.
+`assumptions`: what the file of a fitted arm says of its numbers.
 `misses`: responses that the fitted curve misses, and the changes that would help.
 `posterior`: the distribution of the fitted numbers, and their scatter between records.
 """

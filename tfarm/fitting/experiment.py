@@ -31,8 +31,9 @@ from tfarm.dsp.simulate import quantisers
 from tfarm.errors import MISSING, did_you_mean, require
 from tfarm.fitting.data import check_signal
 from tfarm.fitting.intervals import Fitted, confidence_intervals
-from tfarm.fitting.model import Problem, free_parameters, is_of_chain, with_run_numbers
+from tfarm.fitting.model import Problem, free_parameters, is_of_chain
 from tfarm.fitting.run_model import fit_run
+from tfarm.fitting.run_numbers import with_run_numbers
 from tfarm.fitting.runs import DRIVE_GAIN, GAIN_KEY, Run, commanded
 from tfarm.fitting.solve import Solution, principal_axes
 from tfarm.records import frozen

@@ -8,7 +8,6 @@ Curves over frequency and gains have the arms that the data leave possible as a 
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
@@ -21,13 +20,12 @@ from scipy.special import gammaincinv
 
 from tfarm.arm import Arm, must_be_arm
 from tfarm.arm.chain import Chain, file_text
-from tfarm.arm.schema import file_key
 from tfarm.arm.writing import to_toml
 from tfarm.arrays import Complex, Real
-from tfarm.digits import join_words
-from tfarm.errors import ConvergenceError, one_line, require
+from tfarm.errors import ConvergenceError, require
 from tfarm.files import is_standard_output, write_file
-from tfarm.fitting.data import CONFIDENCE, NUMBER, Measured, must_be_measured, noise_of, rms
+from tfarm.fitting.assumptions import assumptions_of
+from tfarm.fitting.data import CONFIDENCE, Measured, must_be_measured, noise_of, rms
 from tfarm.fitting.intervals import BetterError, Fitted, confidence_intervals
 from tfarm.fitting.misses import Miss, Remedy, misses_of, remedies_of
 from tfarm.fitting.model import (
@@ -36,13 +34,13 @@ from tfarm.fitting.model import (
     RingMode,
     free_parameters,
     is_of_chain,
-    with_run_numbers,
 )
 from tfarm.fitting.overlay import ResonanceShift, resonance_shifts
 from tfarm.fitting.posterior import SUFFIX, Posterior, Repeats, posterior_of, repeats
 from tfarm.fitting.ratio import ratio_of
 from tfarm.fitting.result_rows import FittedResponse, RunResults
 from tfarm.fitting.run_model import fit_run
+from tfarm.fitting.run_numbers import with_run_numbers
 from tfarm.fitting.runs import DRIVE_GAIN, GAIN_KEY, Run, commanded
 from tfarm.fitting.solve import (
     FIT_SEED,
@@ -84,6 +82,23 @@ class Fit(RunResults):
     def arm_name(self) -> Annotated[str, Quantity("arm", help="arm at which the fit starts")]:
         """The arm that the fit began with."""
         return self.before.name
+
+    def assumptions(self, number: int = 0) -> tuple[str, ...]:
+        """Return the assumptions of one of its arms."""
+        family = (self.problem.family, *self.problem.others)[number]
+        runs = [each.run for each in self.problem.runs if each.arm == number]
+        return assumptions_of(
+            family, self.parameters, self.in_words, self.responses, runs, self.not_determined
+        )
+
+    @cached_property
+    def arms(self) -> tuple[Arm, ...]:
+        """All arms of the fit at the fitted numbers, the first as `arm`."""
+        found = [self.arm]
+        for number, arm in enumerate(self.problem.arms(self.point)[1:], start=1):
+            words = self.assumptions(number)
+            found.append(replace(arm, name=f"{arm.name}-fitted", assumptions=words))
+        return tuple(found)
 
     @property
     def arm_table(
@@ -243,8 +258,10 @@ class Fit(RunResults):
         known = sum(each.identified for each in self.parameters)
         share = f"reduced chi-squared = {self.chi_squared / max(self.freedom, 1):.3g}"
         if self.problem.runs and (self.is_explained or not self.has_known_noise):
-            white = "white" if self.is_explained else "not white"
-            share = f"residuals are {white} (chance {self.chance_of_white:.2g})"
+            white = "white and independent of the input"
+            if not self.is_explained:
+                white = "no white noise that is independent of the input"
+            share = f"residuals are {white} (chance {self.chance_of_noise:.2g})"
         tests = {
             None: "noise estimated from the residuals: the model cannot be tested",
             True: f"model not rejected: {share}",
@@ -300,9 +317,15 @@ def fit(
     wanted = [*free]
     if DRIVE_GAIN in wanted:
         arm, runs = commanded(arm, runs)
-        given = [_renamed(each) for each in (dict.fromkeys(free), start, bounds, priors)]
+        given = [renamed(each) for each in (dict.fromkeys(free), start, bounds, priors)]
         wanted, start, bounds, priors = [*given[0]], *given[1:]
     subject = _problem(arm, data, wanted, start, bounds, priors, rings, runs, chain or Chain())
+    return fit_of(subject, profile, progress)
+
+
+def fit_of(subject: Problem, profile: bool, progress: Progress | None) -> Fit:
+    """Return the best solution of a problem, with intervals and the arm of it."""
+    name = subject.family.arm.name
     found = best_solution(subject)
     # a profile may find a lower sum of squares than the search did, a few times
     for _ in range(4):
@@ -320,56 +343,22 @@ def fit(
         fitted, unknown = confidence_intervals(found, profile=False)
     fit = Fit(
         **{each.name: getattr(found, each.name) for each in fields(found)},
-        arm=replace(found.problem.arm(found.point), name=f"{arm.name}-fitted"),
-        before=replace(subject.arm(np.zeros(found.point.size)), name=arm.name),
+        arm=replace(found.problem.arm(found.point), name=f"{name}-fitted"),
+        before=subject.arm(np.zeros(found.point.size)),
         parameters=fitted,
         not_determined=unknown,
         interval_by="profile likelihood" if profile else "covariance",
     )
-    return replace(fit, arm=replace(fit.arm, assumptions=_assumptions(fit, arm.assumptions)))
+    return replace(fit, arm=replace(fit.arm, assumptions=fit.assumptions()))
 
 
-def _renamed(given: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Return numbers by key, that of the drive's gain under the key which the arm has it by."""
-    return {GAIN_KEY if key == DRIVE_GAIN else key: value for key, value in (given or {}).items()}
-
-
-def _assumptions(fit: Fit, before: Sequence[str]) -> tuple[str, ...]:
-    """Return the arm's assumptions, marked where they name a fitted number, then the fit and its data."""
-    # characters of a file in an assumption
-    longest_name = 200
-    family = fit.problem.family
-    texts: list[str] = []
-    for text in before:
-        labels = [file_key(key).label for key in family.keys if is_named(key, family.value(key), text)]
-        mark = f"Before the fit of {join_words(labels)}: " if labels else ""
-        texts.append(mark + text.removeprefix(mark))
-    numbers = [each for each in fit.parameters if "." in each.key]
-    values = [f"{each.label} = {each.value:.6g} {file_key(each.key).unit}".rstrip() for each in numbers]
-    values = values or ["sensors alone"]
-    texts.append(f"Fitted: {join_words(values)}, from the arm {fit.before.name}; {fit.in_words}.")
-    for each in fit.responses:
-        digest = each.digest or "none"
-        texts.append(
-            f"Fitted to {each.label} of {one_line(Path(each.source).name, longest_name)}, SHA-256 {digest}."
-        )
-    for run in (one.run for one in fit.problem.runs):
-        loop = "in open loop" if run.law is None else f"under {run.law.name}"
-        name = one_line(Path(run.source).name, longest_name)
-        texts.append(f"Fitted to a run of {name} {loop}, SHA-256 {run.digest or 'none'}.")
-    return (*texts, *(f"Of the fit: {words}." for words in fit.not_determined))
-
-
-def is_named(key: str, value: float, text: str) -> bool:
-    """Return whether a text names a number of an arm: by its label, by its symbol (I_h =), or by its value and unit."""
-    of = file_key(key)
-    *words, last = of.label.split()
-    # a symbol ends a label: I_h, Kt
-    symbol = last if len(last) <= 3 else ""
-    label = " ".join(words) if symbol else of.label
-    pattern = rf"(?i:\b{re.escape(label)}\b)" + rf"|(?<!\d )\b{symbol}(?=,| and | of | =)" * bool(symbol)
-    values = re.findall(rf"({NUMBER}) {re.escape(of.unit)}(?![\w^/]| m\^)", text) if of.unit else []
-    return bool(re.search(pattern, text)) or value in map(float, values)
+def renamed(given: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return numbers by key, that of the drive's gain under the key which the arm has it by, alone or before a name."""
+    found = {}
+    for key, value in (given or {}).items():
+        plain, colon, name = key.partition(":")
+        found[GAIN_KEY + colon + name if plain == DRIVE_GAIN else key] = value
+    return found
 
 
 def _problem(
@@ -479,9 +468,12 @@ def stable_share(arms: Sequence[Arm], ranges: Sequence[tuple[float, float]]) -> 
 def save_fit(fit: Fit, path: Path) -> None:
     """Write the fitted arm with the chain of its runs, and its posterior to a file of the same name.
 
-    Only the arm where that is a stream.
+    Only the arm where that is a stream.  Other arms of the fit have files of their names beside it.
     """
-    write_file(path, file_text(fit.arm, fit.chain).encode(), key="--save")
-    if path.is_file() and not is_standard_output(path) and fit.posterior.numbers:
-        content = f"{fit.posterior.model_dump_json(indent=1)}\n".encode()
-        write_file(path.with_name(f"{path.stem}{SUFFIX}"), content, key="--save")
+    files = [path, *(path.with_name(f"{each.name}{path.suffix}") for each in fit.arms[1:])]
+    for file, arm in zip(files, fit.arms, strict=True):
+        posterior = fit.posterior.of_arm(arm.name.removesuffix("-fitted"))
+        write_file(file, file_text(arm, fit.chain).encode(), key="--save")
+        if file.is_file() and not is_standard_output(file) and posterior.numbers:
+            content = f"{posterior.model_dump_json(indent=1)}\n".encode()
+            write_file(file.with_name(f"{file.stem}{SUFFIX}"), content, key="--save")

@@ -234,11 +234,13 @@ def profile_end(found: Solution, n: int, at: float, quantile: float, held: dict[
     own = near = inside = found.point[n]
     outside = math.inf if at > own else -math.inf
     root_near = 0.0
+    # of a run's sum of squares: a part in 1,000 of what a deviation adds
+    change = 1e-3 / found.chi_squared if found.problem.runs else 1e-9
     # three steps do but in a crooked valley
     for _ in range(12):
         at = np.clip(at, low, high)
         start = found.point + slope * (at - own)
-        there = nearest_minimum(found.problem, start, held | {n: at})
+        there = nearest_minimum(found.problem, start, held | {n: at}, change=change)
         growth = there.chi_squared - found.chi_squared
         # of a sum of squares: a profile that falls by more has left the valley of the best
         if growth < -0.05:

@@ -213,7 +213,8 @@ SENSOR_DELAY = "delay"
 
 def is_of_chain(key: str) -> bool:
     """Return whether a free number is a sensor's or of the drive's dead time, and none of the arm's."""
-    return key in (SENSOR_GAIN, SENSOR_DELAY, DRIVE_DELAY) or key.startswith(f"{SENSOR_GAIN}:")
+    starts = (f"{SENSOR_GAIN}:", f"{DRIVE_DELAY}:")
+    return key in (SENSOR_GAIN, SENSOR_DELAY, DRIVE_DELAY) or key.startswith(starts)
 
 
 @dataclass(frozen=True)
@@ -246,6 +247,9 @@ class FitResponse:
         if self.noise.is_known:
             return self
         factor = math.sqrt((residuals @ residuals) / residuals.size * share)
+        # of a deviation: a change that moves no number
+        if abs(factor - 1) < 1e-6:
+            return self
         return replace(self, noise=replace(self.noise, sigma=self.noise.sigma * max(factor, 1e-12)))
 
     def over_deviation(self, values: Complex) -> Real:
@@ -269,13 +273,18 @@ class Fraction(NamedTuple):
 
 @dataclass(frozen=True)
 class Problem:
-    """What is searched for: `parameters` of the arm first, then those of the sensors, and what they have to explain."""
+    """What is searched for: `parameters` of the arm first, then those of the sensors, and what they have to explain.
+
+    Runs may be of several arms, the family's own and `others`, the rest is of the first.  A number that not all of them
+    share has the arm's name in its key: "link.length:ruler".
+    """
 
     family: KeyedArms
     parameters: tuple[Parameter, ...]
     responses: tuple[FitResponse, ...]
     rings: tuple[RingMode, ...] = ()
     runs: tuple[FitRun, ...] = ()
+    others: tuple[KeyedArms, ...] = ()
 
     @property
     def records(self) -> tuple[FitResponse | FitRun, ...]:
@@ -284,8 +293,8 @@ class Problem:
 
     @cached_property
     def of_the_arm(self) -> tuple[Parameter, ...]:
-        """The parameters that are the arm's."""
-        return self.parameters[: len(self.family.keys)]
+        """The parameters that are the arm's, or one of the arms'."""
+        return tuple(each for each in self.parameters if each.key.partition(":")[0] in self.family.keys)
 
     @cached_property
     def bounds(self) -> tuple[Real, Real]:
@@ -303,11 +312,19 @@ class Problem:
         low, high = self.bounds
         return np.clip(point, low + by, high - by)
 
-    def arm(self, point: Real) -> Arm:
-        """Return the arm at a point."""
-        return self.family.at(
-            {each.key: each.value(x) for each, x in zip(self.of_the_arm, point.tolist(), strict=False)}
-        )
+    def arm(self, point: Real, number: int = 0) -> Arm:
+        """Return the arm at a point, by its number where there are several."""
+        family = (self.family, *self.others)[number]
+        values = {}
+        for each, x in zip(self.of_the_arm, point.tolist(), strict=False):
+            key, _, name = each.key.partition(":")
+            if name in ("", family.arm.name):
+                values[key] = each.value(x)
+        return family.at(values)
+
+    def arms(self, point: Real) -> list[Arm]:
+        """Return all arms at a point."""
+        return [self.arm(point, number) for number in range(1 + len(self.others))]
 
     def value(self, point: Real, place: int) -> float:
         """Return the number of that place in the vector at a point."""
@@ -388,20 +405,35 @@ class Problem:
         )
 
     def jacobian(self, point: Real) -> Real:
-        """Return the derivatives of the residuals (size, parameters)."""
-        here = self._terms(point)
+        """Return the derivatives of the residuals (size, parameters).
+
+        Those of a run are at constant own numbers, with what these can add projected out (Kaufman 1975).
+        """
+        arms = self.arms(point)
+        projections = [
+            each.projection(arms[each.arm], lambda place: self.value(point, place)) for each in self.runs
+        ]
+        own = [each.own for each in projections]
+        here = self._terms(point, own)
         # the rounding of a float over it is 1e-10, its square below
         size = 2.0**-20
-        return np.stack([self._slope(here, point, step) for step in size * np.eye(point.size)], axis=1)
+        steps = size * np.eye(point.size)
+        found = np.stack([self._slope(here, point, step, own) for step in steps], axis=1)
+        row = sum(each.size for each in self.responses)
+        for each in projections:
+            rows = found[row : row + each.residuals.size]
+            rows -= each.basis @ (each.basis.T @ rows)
+            row += each.residuals.size
+        return found
 
-    def _slope(self, here: tuple[list[Fraction], Real], point: Real, step: Real) -> Real:
+    def _slope(self, here: tuple[list[Fraction], Real], point: Real, step: Real, own: Sequence[Real]) -> Real:
         """Return the derivatives along one coordinate; from the arm itself where there is none on one side."""
         sides = [here, here]
         size = float(step.max())
         width = 0.0
         for side, to in enumerate((point - step, point + step)):
             with suppress(ParameterError):
-                sides[side] = self._terms(to)
+                sides[side] = self._terms(to, own)
                 width += size
         (below, low), (above, high) = sides
         slopes = []
@@ -413,16 +445,24 @@ class Problem:
             slopes.append(one.over_deviation((dN - N / D * dD) / D))
         return np.concatenate([*slopes, high - low]) / max(width, size)
 
-    def _terms(self, point: Real) -> tuple[list[Fraction], Real]:
-        """Return the responses, and what runs, decays and priors leave."""
+    def _terms(self, point: Real, own: Sequence[Real] = ()) -> tuple[list[Fraction], Real]:
+        """Return the responses, and what runs, decays and priors leave; `own` are the runs' numbers, if given."""
         coordinates = zip(self.parameters, point.tolist(), strict=True)
         priors = [
             (each.value(x) - each.prior[0]) / each.prior[1]
             for each, x in coordinates
             if each.prior is not None
         ]
-        arm = self.arm(point)
-        runs = [each.residuals(arm, lambda place: self.value(point, place)) for each in self.runs]
+        arms = self.arms(point)
+
+        def value(place: int) -> float:
+            return self.value(point, place)
+
+        if own:
+            pairs = zip(self.runs, own, strict=True)
+            runs = [each.residuals_with(arms[each.arm], value, numbers) for each, numbers in pairs]
+        else:
+            runs = [each.residuals(arms[each.arm], value) for each in self.runs]
         return self.fractions(point), np.concatenate([*runs, self.decays(point, self.rings), priors])
 
     def decays(self, point: Real, rings: Sequence[RingMode]) -> Real:
@@ -434,46 +474,6 @@ class Problem:
             if each.ratio is not None:
                 rows.append((-s.real / abs(s) - each.ratio) / each.ratio_deviation)
         return np.array(rows)
-
-
-def with_run_numbers(
-    problem: Problem,
-    free: Sequence[str],
-    start: Mapping[str, float],
-    bounds: Mapping[str, tuple[float, float]],
-    priors: Mapping[str, tuple[float, float]],
-) -> Problem:
-    """Return the problem with the drive's dead time and gains of sensors free, which its runs have in common.
-
-    Raises ParameterError for a gain of a signal that no run has.
-    """
-    own = [*problem.parameters]
-    runs = [*problem.runs]
-    for key in free:
-        name = key.partition(":")[2]
-        if key == DRIVE_DELAY:
-            require(runs, "free", key, "is of a run: give one, or leave it out")
-            sampling = runs[0].chain.sampling
-            at = start.get(key, sampling.delay_samples * sampling.period)
-            low, high = bounds.get(key, (0.0, 50 * runs[0].run.period))
-            size = runs[0].run.period
-            runs = [replace(each, delay=len(own)) for each in runs]
-        elif name:
-            require(any(name in each.run.names for each in runs), "free", key, "no run has that signal")
-            at = start.get(key, 1.0)
-            low, high = bounds.get(key, (0.0, math.inf))
-            size = 0.0
-            place = len(own)
-            runs = [
-                replace(each, gains=(*each.gains, (name, place))) if name in each.run.names else each
-                for each in runs
-            ]
-        else:
-            continue
-        remedy = f"starts at {at:g}; give bounds low,high around it, or another start"
-        require(low <= at <= high and low < high, f"bounds of {key}", (low, high), remedy)
-        own.append(Parameter(key, at, low, high, size, priors.get(key)))
-    return replace(problem, parameters=tuple(own), runs=tuple(runs))
 
 
 def penalize(residuals: Callable[[Real], Real], first: Real) -> Callable[[Real], Real]:

@@ -74,8 +74,19 @@ class Posterior(StrictTable):
     @property
     def with_all_determined(self) -> Posterior:
         """The posterior with a deviation of `OPEN_DEVIATION` where the data say nothing."""
-        whole = self.matrix + OPEN_DEVIATION**2 * (np.eye(len(self.numbers)) - self.information @ self.matrix)
+        # by its axes: the identity less information times covariance is rounded by more than the least variance
+        sizes, axes = np.linalg.eigh(self.matrix)
+        is_open = sizes <= NO_VARIANCE * abs(sizes).max(initial=0.0)
+        unknown = axes[:, is_open]
+        whole = self.matrix + OPEN_DEVIATION**2 * unknown @ unknown.T
         return self.model_copy(update={"covariance": whole.tolist(), "not_determined": []})
+
+    def of_arm(self, name: str) -> Posterior:
+        """Return the distribution of the numbers of one of several arms, under the keys of its file."""
+        rows = [n for n, key in enumerate(self.keys) if key.partition(":")[2] in ("", name)]
+        numbers = [self.numbers[n].model_copy(update={"key": self.keys[n].partition(":")[0]}) for n in rows]
+        covariance = self.matrix[np.ix_(rows, rows)].tolist()
+        return self.model_copy(update={"arm": name, "numbers": numbers, "covariance": covariance})
 
     def must_be_determined(self, ranged: Sequence[str]) -> None:
         """Raise ParameterError, naming a number, unless the data determine all numbers once those are given."""

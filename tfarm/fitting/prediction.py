@@ -16,7 +16,7 @@ noise.  Where the noise of a sensor is not known it is that of second difference
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple
@@ -284,21 +284,9 @@ def predict(
     nulls = {PREDICTED: found.outputs, **constant_models(subject)}
     for each in null_models(own, before, before_chain, without or {}):
         nulls[each.name] = computed(each, subject).outputs
-    rows = []
-    for place, name in enumerate(run.names):
-        moved = shift * (name == "hub_angle")
-        start = float(found.outputs[place][0])
-        y = of.measured[place]
-        rows.append(signal_row(subject, name, "measured", y, start, moved))
-        for origin, values in nulls.items():
-            row = signal_row(subject, name, origin, values[place], start, moved, is_short=origin != PREDICTED)
-            is_known = np.isfinite(values[place]).all()
-            rows.append(row._replace(rms=rms(values[place] - y) if is_known else None))
     half = None
     if posterior is not None:
-        spread = [computed(each, subject).outputs for each in drawn_models(own, posterior, draws)]
-        variance = np.mean((np.array(spread) - found.outputs) ** 2, axis=0)
-        half = REACH * np.sqrt(variance + sigma[:, None] ** 2)
+        half = half_band(found.outputs, sigma, drawn_models(own, posterior, draws), subject)
     residual = Residual(own.arm, of, tuple(own.gains.values()), found.by_offset, found.fitted, left, sigma)
     signals = [residual_of(residual, place, half) for place in range(len(run.names))]
     moves = np.array([[shift * (name == "hub_angle")] for name in run.names])
@@ -313,13 +301,39 @@ def predict(
         samples=run.count,
         period=run.period,
         offsets=dict(zip(run.names, (found.offsets + moves[:, 0]).tolist(), strict=True)),
-        rows=tuple(rows),
+        rows=tuple(signal_rows(subject, of.measured, nulls, moves[:, 0].tolist())),
         residuals=tuple(signals),
         causes=() if all(each.is_noise for each in signals) else tuple(causes_of(residual)),
     )
 
 
+def half_band(predicted: Real, sigma: Real, drawn: Iterator[RunModel], run: Run) -> Real:
+    """Return half the width (outputs, n) of the band of arms that are drawn, and of the noise (outputs,).
+
+    Raises ParameterError for an arm whose loop grows without bound.
+    """
+    spread = np.array([computed(each, run).outputs for each in drawn])
+    remedy = "an arm drawn of it has a loop that grows without bound"
+    require(np.isfinite(spread).all(), "posterior", run.source, remedy)
+    variance = ((spread - predicted) ** 2).mean(axis=0)
+    return np.asarray(REACH * np.sqrt(variance + sigma[:, None] ** 2))
+
+
 # ------------------------------------------------------------ figures
+
+
+def signal_rows(
+    run: Run, measured: Real, models: Mapping[str, Real], shifts: Sequence[float]
+) -> Iterator[SignalRow]:
+    """Yield the figures of each signal: as measured, as predicted, and of each null model."""
+    for place, name in enumerate(run.names):
+        start = float(models[PREDICTED][place][0])
+        y = measured[place]
+        yield signal_row(run, name, "measured", y, start, shifts[place])
+        for origin, values in models.items():
+            z = values[place]
+            row = signal_row(run, name, origin, z, start, shifts[place], is_short=origin != PREDICTED)
+            yield row._replace(rms=rms(z - y) if np.isfinite(z).all() else None)
 
 
 def signal_row(

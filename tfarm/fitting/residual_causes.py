@@ -29,7 +29,8 @@ from tfarm.arm.writing import KeyedArms
 from tfarm.arrays import Real
 from tfarm.digits import general
 from tfarm.fitting.decays import NOT_WHITE
-from tfarm.fitting.run_model import FitRun, chance_of_white
+from tfarm.fitting.run_model import FitRun
+from tfarm.fitting.whiteness import chance_of_white
 from tfarm.records import frozen
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Percent, Quantity
@@ -290,10 +291,12 @@ def another_mode(residual: Residual) -> ResidualCause:
     total = float((scaled**2).sum())
     # turns in the record: fewer are a drift, and no mode
     lowest = 3 * HERTZ / (run.count * T)
+    # nearer to half the rate of sampling it is a share of the input, and no mode
+    highest = 0.8 * math.pi / T
 
     def left(x: Real) -> float:
         omega, ratio = np.exp(x)
-        if not (lowest <= omega < math.pi / T and 1e-4 < ratio < 0.1):
+        if not (lowest <= omega <= highest and 1e-4 < ratio < 0.1):
             return total
         columns = mode_columns(complex(-ratio, 1.0) * omega, u, T)
         e = scaled - (columns @ np.linalg.lstsq(columns, scaled.T)[0]).T
@@ -302,7 +305,7 @@ def another_mode(residual: Residual) -> ResidualCause:
     power = (abs(np.fft.rfft(scaled * np.hanning(run.count))) ** 2).sum(axis=0)
     omega = HERTZ * np.fft.rfftfreq(run.count, T)
     peaks = np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:])) + 1
-    peaks = peaks[omega[peaks] >= lowest]
+    peaks = peaks[(omega[peaks] >= lowest) & (omega[peaks] <= highest)]
     lines = omega[peaks[np.argsort(-power[peaks])[:5]]]
     starts = [np.log([line, ratio]) for line in lines.tolist() for ratio in (0.003, 0.02, 0.08)]
     if not starts:

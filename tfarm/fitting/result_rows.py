@@ -14,8 +14,9 @@ from tfarm.arm import Arm
 from tfarm.arm.chain import Chain
 from tfarm.arrays import Real
 from tfarm.exact.outputs import signal_words
-from tfarm.fitting.run_model import BIAS, chance_of_white
+from tfarm.fitting.run_model import BIAS
 from tfarm.fitting.solve import Solution
+from tfarm.fitting.whiteness import chance_of_white
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 

@@ -11,6 +11,10 @@ A bias is integrated twice by a hub that turns freely.
 
 Noise of a sensor e that the controller reads acts on the arm, too: what it leaves is S e.  With the loop L of the same
 arm e = (1 + L) S e is white again (`through_loop`), as the errors of a prediction by the recorded signals are.
+
+Where only the input is known under a controller, and the sensors' noise is white, output errors are white and have
+no bias: u_k depends on noise up to y_k, and what u_k does is seen from y_{k+1} on.  A torque on the input makes them
+neither.  The errors of the stationary Kalman predictor are both, in open loop, too (Ljung 1999, section 13.5).
 """
 
 from __future__ import annotations
@@ -22,7 +26,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.linalg import solve_discrete_are
 
 from tfarm.arm import AT_HUB, Arm
 from tfarm.arm.chain import Chain, Sampling
@@ -30,13 +34,14 @@ from tfarm.arrays import Real
 from tfarm.case import Case
 from tfarm.dsp import kernel
 from tfarm.dsp.discretise import acting_law
+from tfarm.dsp.kernel import law_outputs
 from tfarm.dsp.plant import Plant
 from tfarm.dsp.pulse import PulseTransfer
 from tfarm.dsp.results import ideal_chain
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.sensed import sensed_plant
 from tfarm.dsp.simulate import LinearLoop, quantisers, references_of
-from tfarm.errors import require
+from tfarm.errors import ParameterError, require
 from tfarm.fitting.held import modes_at_period
 from tfarm.fitting.runs import Run
 from tfarm.records import frozen
@@ -52,6 +57,19 @@ class RunResponse(NamedTuple):
     by_own: Real
 
 
+class Projection(NamedTuple):
+    """Residuals (size,) of a run, orthonormal to `basis` (size, rank), at its `own` numbers (own,).
+
+    Columns of a unit of each own number have the norms `size`, and scaled to 1 the triangular factor `R`.
+    """
+
+    residuals: Real
+    basis: Real
+    own: Real
+    R: Real
+    size: Real
+
+
 @dataclass(frozen=True)
 class FitRun:
     """A run in a fit: through which `chain`, with `count` modes, and the deviations `sigma` of its outputs.
@@ -59,6 +77,8 @@ class FitRun:
     `is_known` (outputs,) is whether a deviation was given, or is that of the residuals.  `gains` has the places of
     sensors' gains in the vector of what is searched for, `delay` that of the drive's dead time.  `own` is how many
     numbers it has of its own: with `is_moving` also the hub's drift and amplitudes of the lowest modes at the start.
+    `arm` is the number of its arm, where there are several.  `disturbance` has the places of the deviations of a torque
+    on the input over those of each output's noise, where errors are those of the Kalman predictor.
     One that `is_ideal` has no steps and limits of its chain.
     """
 
@@ -72,6 +92,8 @@ class FitRun:
     through_loop: bool = False
     gains: tuple[tuple[str, int], ...] = ()
     delay: int | None = None
+    arm: int = 0
+    disturbance: tuple[int, ...] = ()
     is_ideal: bool = True
 
     @property
@@ -131,7 +153,11 @@ class FitRun:
         rows = residuals.reshape(len(self.sigma), -1)
         factors = np.maximum(np.sqrt((rows**2).mean(axis=1) * share), 1e-12)
         sigma = np.maximum(np.array(self.sigma) * factors, self.least_deviation)
-        return replace(self, sigma=tuple(np.where(self.is_known, self.sigma, sigma).tolist()))
+        sigma = np.where(self.is_known, self.sigma, sigma)
+        # of a deviation: a change that moves no number
+        if np.allclose(sigma, self.sigma, rtol=1e-6, atol=0.0):
+            return self
+        return replace(self, sigma=tuple(sigma.tolist()))
 
     # ------------------------------------------------------------ outputs
 
@@ -265,36 +291,58 @@ class FitRun:
 
     def residuals(self, arm: Arm, value: Callable[[int], float]) -> Real:
         """Return computed less measured over the deviations (size,), the run's own numbers at their least squares."""
-        off, basis, _ = self._projection(arm, value)
-        return off - basis @ (basis.T @ off)
+        return self.projection(arm, value).residuals
+
+    def residuals_with(self, arm: Arm, value: Callable[[int], float], own: Real) -> Real:
+        """Return computed less measured over the deviations (size,), the run's own numbers (own,) given."""
+        pulse = self.pulse(arm, value)
+        rows = self.rows(pulse)
+        bias, *others = own.tolist()
+        found = np.zeros((len(pulse.plant.outputs), self.run.count))
+        for number, one in zip(others, self._free(pulse, rows), strict=False):
+            found += number * one
+        steady = np.full(self.run.count, bias)
+        if self.run.law is None:
+            u = self.commands(None) + steady
+        else:
+            loop = self.loop(arm, value)
+            u = loop.input(loop.wanted - loop.read(found), steady)
+            at_once = PulseTransfer(pulse.plant, replace(pulse.sampling, delay_samples=0.0))
+            found += at_once.held_response(steady)
+        found += pulse.held_response(u)
+        parts = (found[rows] - self.measured)[None]
+        return self._whitened(arm, value, parts)[0]
 
     def own_numbers(self, arm: Arm, value: Callable[[int], float]) -> tuple[Real, Real]:
         """Return the run's own numbers and their standard deviations; not a number where they are not determined."""
-        off, _, columns = self._projection(arm, value)
-        size = np.linalg.norm(columns, axis=0)
-        is_seen = size > 0
-        scaled = columns[:, is_seen] / size[is_seen]
-        found = np.full((2, size.size), math.nan)
-        found[0, is_seen] = -np.linalg.lstsq(scaled, off)[0] / size[is_seen]
-        spread = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
-        found[1, is_seen] = np.sqrt(np.diag(spread)) / size[is_seen]
-        return found[0], found[1]
+        found = self.projection(arm, value)
+        spread = np.sqrt(np.diag(np.linalg.pinv(found.R.T @ found.R, hermitian=True)))
+        size = found.size
+        with np.errstate(divide="ignore", invalid="ignore"):
+            deviations = np.where(size > 0, spread / size, math.nan)
+        return np.where(size > 0, found.own, math.nan), deviations
 
-    def _projection(self, arm: Arm, value: Callable[[int], float]) -> tuple[Real, Real, Real]:
-        """Return the residuals with own numbers of 0, an orthonormal basis of what these can add, and their columns."""
+    def projection(self, arm: Arm, value: Callable[[int], float]) -> Projection:
+        """Return the residuals without what the run's own numbers can add, and these numbers."""
         found = self.respond(arm, value)
         parts = np.concatenate([(found.outputs - self.measured)[None], found.by_own])
+        off, *columns = self._whitened(arm, value, parts)
+        size = np.linalg.norm(columns, axis=1)
+        scaled = np.transpose(columns) / np.where(size > 0, size, 1.0)
+        Q, R = np.linalg.qr(scaled)
+        # a column that others make up adds nothing
+        basis = Q[:, abs(np.diag(R)) > 1e-9]
+        own = -np.linalg.lstsq(R, Q.T @ off)[0] / np.where(size > 0, size, 1.0)
+        return Projection(off - basis @ (basis.T @ off), basis, own, R, size)
+
+    def _whitened(self, arm: Arm, value: Callable[[int], float], parts: Real) -> Real:
+        """Return deviations (rows, outputs, n) as errors of the noise model over its deviations, (rows, size)."""
         require(np.isfinite(parts).all(), "run", self.run.source, "the loop of this arm grows without bound")
         if self.through_loop:
             parts = self.innovations(arm, value, parts)
-        parts = (parts / np.array(self.sigma)[:, None]).reshape(len(parts), -1)
-        off = parts[0]
-        columns = parts[1:].T
-        size = np.linalg.norm(columns, axis=0)
-        seen = columns[:, size > 0] / size[size > 0]
-        Q, R = np.linalg.qr(seen)
-        # a column that others make up adds nothing
-        return off, np.asarray(Q[:, abs(np.diag(R)) > 1e-9]), columns
+        if self.disturbance:
+            parts = self.prediction_errors(arm, value, parts)
+        return (parts / np.array(self.sigma)[:, None]).reshape(len(parts), -1)
 
     def innovations(self, arm: Arm, value: Callable[[int], float], parts: Real) -> Real:
         """Return (1 + L) of deviations (rows, outputs, n): what the noise of sensors was before it went round."""
@@ -307,6 +355,38 @@ class FitRun:
             read[rows] = -part
             found.append(part - pulse.held_response(loop.input_alone(loop.read(read)))[rows])
         return np.array(found)
+
+    def prediction_errors(self, arm: Arm, value: Callable[[int], float], parts: Real) -> Real:
+        """Return deviations (rows, outputs, n) less what the stationary Kalman predictor has of them from the past.
+
+        x+ = A x + B (u + w), y = C x + v with white w, v: the errors e = y - C x' of x'+ = A x' + B u + K e are white,
+        K = A P C' S^-1, S = C P C' + R.  Those of one sample are made independent by a triangular matrix with 1 on its
+        diagonal, so that likelihoods compare.
+        """
+        pulse = self.pulse(arm, value)
+        A, _, C = pulse.matrices()
+        at_once = PulseTransfer(pulse.plant, replace(pulse.sampling, delay_samples=0.0))
+        states = pulse.integrals_at + 2
+        by_torque = np.zeros(len(A))
+        by_torque[:states] = at_once.matrices()[1][:states]
+        rows = self.rows(pulse)
+        # outputs over their noise, and a torque of deviation 1
+        ratio = np.array([value(place) for place in self.disturbance])
+        seen = C[rows] * ratio[:, None]
+        unit = np.eye(len(rows))
+        try:
+            P = solve_discrete_are(A.T, seen.T, np.outer(by_torque, by_torque), unit)
+        except np.linalg.LinAlgError:
+            remedy = "no stationary predictor of this arm was found"
+            raise ParameterError(key="run", value=self.run.source, remedy=remedy) from None
+        S = seen @ P @ seen.T + unit
+        K = np.linalg.solve(S, seen @ P @ A.T).T * ratio
+        L = np.linalg.cholesky(S)
+        monic = np.diag(L)[:, None] * np.linalg.inv(L) * ratio / ratio[:, None]
+        predictor = np.hstack([A - K @ C[rows], K])
+        # of a triangular matrix times [-C, 1]
+        tables = [np.vstack([predictor, row]) for row in monic @ np.hstack([-C[rows], unit])]
+        return np.array([[law_outputs(table, part.T) for table in tables] for part in parts])
 
     @property
     def reads_all(self) -> bool:
@@ -362,7 +442,7 @@ def fit_run(arm: Arm, run: Run, chain: Chain) -> FitRun:
     known = tuple(name in run.sigma for name in run.names)
     if run.law is not None and run.law.period is not None:
         chain = replace(chain, sampling=replace(chain.sampling, period=run.law.period))
-    is_moving = run.law is None if run.initial is None else run.initial == "free"
+    is_moving = run.initial != "rest"
     found = FitRun(run, chain, modes_at_period(arm, run.period), tuple(sigma), known, is_moving)
     # raises for a period that is no part of the controller's
     assert found.ratio
@@ -382,24 +462,3 @@ def at_period(chain: Chain, period: float) -> Chain:
     sampling = chain.sampling
     delay = sampling.delay_samples * sampling.period / period
     return replace(chain, sampling=replace(sampling, period=period, delay_samples=delay))
-
-
-def chance_of_white(residuals: Real) -> float:
-    """Return the probability that white noise has autocorrelations, or a line of its spectrum, as large as these.
-
-    By Ljung and Box (1978) over 20 lags, and by Fisher (1929) for the largest line of the periodogram; twice the lesser
-    of the two.
-    """
-    e = residuals - residuals.mean()
-    n = e.size
-    lags = np.arange(1, min(20, n // 5) + 1)
-    total = float(e @ e)
-    if total == 0 or not lags.size:
-        return 1.0
-    r = np.array([e[lag:] @ e[:-lag] for lag in lags.tolist()]) / total
-    by_lags = float(chdtrc(lags.size, n * (n + 2) * (r**2 / (n - lags)).sum()))
-    lines = abs(np.fft.rfft(e)[1 : (n + 1) // 2]) ** 2
-    share = float(lines.max() / lines.sum())
-    # the first term of Fisher's series: an upper bound, and the whole of it where it is small
-    by_line = min(1.0, lines.size * (1 - share) ** (lines.size - 1))
-    return min(1.0, 2 * min(by_lags, by_line))

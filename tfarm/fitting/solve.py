@@ -16,6 +16,7 @@ interval rests on Gaussian residuals alone.
 """
 
 import math
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
@@ -29,7 +30,8 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.fitting.data import CONFIDENCE, in_parts
 from tfarm.fitting.model import Problem, penalize
-from tfarm.fitting.run_model import chance_of_white
+from tfarm.fitting.run_numbers import with_disturbance
+from tfarm.fitting.whiteness import chance_of_independent, chance_of_white
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency
@@ -208,6 +210,17 @@ class Solution:
             found += map(chance_of_white, residuals.reshape(len(each.sigma), -1))
         return min(1.0, len(found) * min(found, default=1.0))
 
+    @cached_property
+    def chance_of_noise(self) -> float:
+        """The probability of residuals of the runs so far from white ones that do not depend on what drove them."""
+        found: list[float] = []
+        of_runs = self.parts[len(self.problem.responses) :]
+        for each, residuals in zip(self.problem.runs, of_runs, strict=True):
+            driving = each.run.driving_changes
+            found += (chance_of_independent(e, driving) for e in residuals.reshape(len(each.sigma), -1))
+        independent = min(1.0, len(found) * min(found, default=1.0))
+        return min(1.0, 2 * min(self.chance_of_white, independent))
+
     @property
     def misfit(self) -> float:
         """Minus ln of the likelihood, but for a constant: with the noise, where that is from the residuals."""
@@ -236,9 +249,12 @@ def best_solution(problem: Problem, is_enough: Callable[[Solution], bool | None]
         else:
             found.append(rescale_noise(nearest_minimum(*start_by(problem, draws, shares))))
         best = min(found, key=lambda each: each.misfit)
-        if best.converged and (is_enough or is_explained)(best):
+        is_done = best.converged and (is_enough or is_explained)(best)
+        # a third search on runs that no noise explains takes long
+        if is_done or (problem.runs and len(found) == 2):
             break
-    if open_axes(best.jacobian).size:
+    # a search on runs has begun there already
+    if open_axes(best.jacobian).size and not problem.runs:
         at_start = rescale_noise(nearest_minimum(*with_gains(problem, problem.start)))
         found.append(at_start)
         if at_start.misfit < best.misfit - SAME_SUM:
@@ -268,11 +284,20 @@ def solution_of_runs(problem: Problem, draws: int) -> Solution:
         points.append(best_solution(replace(problem, runs=())).point)
     least = periods * 2 * math.pi / first_frequency(problem.arm(start))
     best = rescale_noise(continued_minimum(problem, points, least))
-    if not any(each.reads_all for each in problem.runs):
-        return best
-    around = tuple(replace(each, through_loop=each.reads_all) for each in best.problem.runs)
-    other = rescale_noise(continued_minimum(replace(best.problem, runs=around), [*points, best.point], least))
-    return min(best, other, key=lambda each: each.misfit)
+    if any(each.reads_all for each in problem.runs):
+        around = tuple(replace(each, through_loop=each.reads_all) for each in best.problem.runs)
+        other = rescale_noise(
+            continued_minimum(replace(best.problem, runs=around), [*points, best.point], least)
+        )
+        best = min(best, other, key=lambda each: each.misfit)
+    is_driven = any(each.run.law is None for each in best.problem.runs)
+    if is_driven and best.chance_of_white <= LEAST_CHANCE:
+        part = replace(problem, runs=tuple(each.until(least) for each in problem.runs))
+        other = solution_with_disturbance(best, [start, continued_minimum(part, points, least).point])
+        # each ratio has to explain more than noise alone would
+        surplus = EXCLUDED / 2 * (other.point.size - best.point.size)
+        best = min(best, other, key=lambda each: each.misfit + (surplus if each is other else 0.0))
+    return best
 
 
 def continued_minimum(problem: Problem, points: Sequence[Real], least: float) -> Solution:
@@ -287,8 +312,39 @@ def continued_minimum(problem: Problem, points: Sequence[Real], least: float) ->
             if all(abs(point - each).max() > apart for each in some):
                 some.append(point)
         kept = some[: 3 if duration == least else 2]
-        points = [nearest_minimum(part, each, evaluations=20).point for each in kept]
-    return min((nearest_minimum(problem, each) for each in points), key=lambda each: each.chi_squared)
+        found = [nearest_minimum(part, each, evaluations=20, change=1e-3) for each in kept]
+        points = [each.point for each in distinct(found)]
+    # noise of unknown size is weighed again, so that the search goes on
+    change = 1e-9 if found[0].has_known_noise else 1e-6
+    ends = [nearest_minimum(problem, each, change=change) for each in points]
+    return min(ends, key=lambda each: each.chi_squared)
+
+
+def solution_with_disturbance(found: Solution, starts: Sequence[Real]) -> Solution:
+    """Return the least prediction errors over starts, with a torque on the input of unknown size.
+
+    The predictor follows the record, so that its errors have few minima where output errors have many.
+    """
+    problem = with_disturbance(found.problem)
+    more = len(problem.parameters) - found.point.size
+    # of the first ratio of deviations: a search finds the rest
+    ratios = np.log([0.01, 0.1, 1.0, 10.0])
+    points = [np.r_[each, np.full(more, ratio)] for each in (found.point, *starts) for ratio in ratios]
+    first = sorted(points, key=partial(sum_of_squares, problem))[:2]
+    ends = [nearest_minimum(problem, each, change=1e-6) for each in first]
+    return rescale_noise(min(ends, key=lambda each: each.chi_squared))
+
+
+def distinct(found: Sequence[Solution]) -> list[Solution]:
+    """Return solutions, the least sum of squares first, without those that the data cannot tell from a lesser one."""
+    kept: list[Solution] = []
+    for one in sorted(found, key=lambda each: each.chi_squared):
+        # of a sum of squares with a unit of reduced chi-squared: what the linearised residuals differ by
+        unit = one.chi_squared / max(one.freedom, 1)
+        apart = [one.jacobian @ (one.point - each.point) for each in kept]
+        if all(step @ step > unit for step in apart):
+            kept.append(one)
+    return kept
 
 
 def nearest_to_start(found: Solution) -> Solution:
@@ -299,15 +355,19 @@ def nearest_to_start(found: Solution) -> Solution:
     """
     least = found.chi_squared
     problem = found.problem
+    count = 0
     for limit, most in ((OPEN_DEVIATION, SAME_SUM), (0.1, EXCLUDED)):
         some = open_axes(found.jacobian, limit)
-        if not some.size:
+        # a wider limit with no more axes leads to the same point
+        if len(some) > count:
+            count = len(some)
+            start = found.point - some.T @ (some @ found.point)
+            held = {n: float(start[n]) for n in abs(some).argmax(axis=1).tolist()}
+            back = nearest_minimum(problem, start, held)
+            # a logarithm may have ended where it changes nothing
+            again = nearest_minimum(problem, back.point)
+        if not count:
             continue
-        start = found.point - some.T @ (some @ found.point)
-        held = {n: float(start[n]) for n in abs(some).argmax(axis=1).tolist()}
-        back = nearest_minimum(problem, start, held)
-        # a logarithm may have ended where it changes nothing
-        again = nearest_minimum(problem, back.point)
         if again.converged and again.chi_squared < least - SAME_SUM:
             return nearest_to_start(again)
         back = replace(back, jacobian=problem.jacobian(back.point), converged=found.converged)
@@ -334,21 +394,28 @@ def open_axes(jacobian: Real, deviation: float = OPEN_DEVIATION) -> Real:
 def is_explained(one: Solution) -> bool | None:
     """Return whether noise alone gives such residuals often enough; None where nothing tests that.
 
-    A sum of squares tests it where the size of all noise is known, and of runs it is white.
+    A sum of squares tests it where the size of all noise is known; of runs it is white, and independent of the input.
     """
     # the probability of a sum of squares by noise alone
     is_small = chdtrc(max(one.freedom, 1), one.chi_squared) > 1e-6
     if one.has_known_noise and not is_small:
         return False
     if one.problem.runs:
-        return one.chance_of_white > LEAST_CHANCE
+        return one.chance_of_noise > LEAST_CHANCE
     return True if one.has_known_noise else None
 
 
 def nearest_minimum(
-    problem: Problem, start: Real, held: dict[int, float] | None = None, evaluations: int = 60
+    problem: Problem,
+    start: Real,
+    held: dict[int, float] | None = None,
+    evaluations: int = 60,
+    change: float = 1e-9,
 ) -> Solution:
-    """Return the nearest minimum from a start, some coordinates held at a value, by a limited number of evaluations."""
+    """Return the nearest minimum from a start, some coordinates held at a value, by a limited number of evaluations.
+
+    The search ends where the sum of squares falls by less than a relative `change`.
+    """
     held = held or {}
     point = start.copy()
     point[list(held)] = list(held.values())
@@ -374,7 +441,7 @@ def nearest_minimum(
         bounds=(low[free], high[free]),
         x_scale="jac",
         xtol=1e-7,
-        ftol=1e-9,
+        ftol=change,
         gtol=None,
         max_nfev=evaluations,
     )
@@ -392,6 +459,8 @@ def rescale_noise(found: Solution) -> Solution:
         share = found.residuals.size / max(found.freedom, 1)
         pairs = zip(found.problem.records, found.parts, strict=True)
         records: Any = [each.rescaled(own, share) for each, own in pairs]
+        if all(map(operator.is_, records, found.problem.records)):
+            break
         problem = replace(found.problem, responses=tuple(records[:count]), runs=tuple(records[count:]))
         found = nearest_minimum(problem, found.point)
     return found
