@@ -5,6 +5,7 @@ import tomllib
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from tfarm.fitting import solve
 from tfarm.fitting.assumptions import is_named
 from tfarm.fitting.data import noise_of
 from tfarm.fitting.fit import fit
+from tfarm.fitting.intervals import profile_end
 from tfarm.fitting.model import RingMode, eigenvalue, mode_of
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -103,6 +105,23 @@ def test_profiles_are_where_the_sum_of_squares_has_grown_by_the_quantile():
         assert (each.high - each.low) / (2 * 1.96 * each.deviation) == pytest.approx(1, abs=0.05)  # nearly Gaussian
 
 
+@pytest.mark.parametrize("waves", [(1.0, 4.0), (1.5, 3.0), (0.9, 7.0), (1.2, 11.0)])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_profile_that_is_not_monotonic_ends_at_its_level_on_its_side(waves, side):
+    """The one residual x + a sin(b x) has its level at several x."""
+    size, speed = waves
+    problem = SimpleNamespace(
+        runs=(),
+        bounds=(np.array([-9.0]), np.array([9.0])),
+        residuals=lambda x: x + size * np.sin(speed * x),
+    )
+    slope = np.array([[1 + size * speed]])
+    found = SimpleNamespace(problem=problem, point=np.zeros(1), jacobian=slope, chi_squared=0.0)
+    end = profile_end(found, 0, side * 1.96 / slope.item(), 1.96, {})
+    assert end * side > 0
+    assert abs(problem.residuals(end)) == pytest.approx(1.96, abs=0.02)
+
+
 @pytest.mark.parametrize("seed", thinned([0, 1], 2))  # E and the density; E and I
 def test_planted_pairs_are_known_by_one_combination(seed):
     assert judged_pair(seed)[0] == "right"
@@ -125,6 +144,7 @@ def test_a_number_bounded_on_one_side_is_free_in_the_intervals_of_others(profile
     mass, inertia = found.parameters
     assert mass.deviation is None
     assert mass.low == 0.0
+    assert math.sqrt(found.posterior.matrix[1, 1]) == pytest.approx(inertia.deviation / inertia.value, rel=1e-3)
     masses = mass.high * np.r_[1e-3, np.linspace(0.04, 2.0, 50)]
     for end in (inertia.low, inertia.high):
         growth = min(chi_squared_at(found, {mass.key: each, inertia.key: end}) for each in masses)
@@ -330,3 +350,21 @@ def test_a_search_out_of_evaluations_goes_on_once(monkeypatch):
     monkeypatch.setattr("tfarm.fitting.solve.start_by", lambda problem, draws, shares: (problem, np.array([-0.06])))
     found = fit(LAB, measured(omega=OMEGA[::4]), free=["link.youngs_modulus"], profile=False)
     assert found.converged
+
+
+@pytest.mark.parametrize("profile", [False, True])
+def test_a_number_that_may_be_infinite_is_free_in_the_intervals_of_others(profile):
+    """A clamp that is all but rigid: its compliance and that of the link are told apart by higher modes alone."""
+    clamped = replace(LAB, clamp=tfarm.RotarySpring(stiffness=1e7))
+    responses = [replace(each, sigma=20 * each.sigma) for each in measured()]
+    found = fit(clamped, responses, free=["clamp.stiffness", "link.youngs_modulus"], profile=profile)
+    stiffness, modulus = found.parameters
+    assert stiffness.high is None
+    assert 100 < stiffness.low < 1e6
+    stiffnesses = stiffness.low * np.geomspace(0.3, 1e3, 60)
+    for end in (modulus.low, modulus.high):
+        growth = min(chi_squared_at(found, {stiffness.key: each, modulus.key: end}) for each in stiffnesses)
+        growth -= found.chi_squared
+        # the covariance has no bound at a stiffness without end
+        assert growth > 1.96**2 * 0.95
+        assert not profile or growth == pytest.approx(1.96**2, rel=0.05)

@@ -275,6 +275,7 @@ def closed_run(inside, n=600, seed=5):
 
 @pytest.mark.parametrize("inside", [False, True])
 def test_the_jacobian_is_that_of_another_difference(inside):
+    """But for what the run's own numbers can add, which a step of the search has no part of (Kaufman 1975)."""
     problem = problem_of(closed_run(inside, n=200))
     problem = replace(problem, runs=tuple(replace(each, through_loop=inside) for each in problem.runs))
     point = np.array([0.05, -0.1, 0.02, 0.1])
@@ -318,6 +319,9 @@ def test_noise_of_sensors_that_the_controller_reads_is_known_by_its_residuals(in
     assert run.through_loop == inside
     assert_found(found, PLANTED)
     assert found.chance_of_white > 0.01
+    (curves,) = found.run_curves
+    # of the output: what the noise does to the arm is in it
+    assert (np.std(curves.computed - curves.measured, axis=1)[2] > 1.3 * SIGMA["root_moment"]) == inside
     for name, sigma in zip(run.run.names, run.sigma, strict=True):
         assert sigma == pytest.approx(SIGMA[name], rel=5 / math.sqrt(2 * run.run.count))
 

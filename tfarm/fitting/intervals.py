@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from tfarm.arm.schema import file_key
-from tfarm.arrays import Real
+from tfarm.arrays import LEAST_SIZE, Real
 from tfarm.fitting.model import Parameter
 from tfarm.fitting.solve import (
     OPEN_DEVIATION,
@@ -157,10 +157,16 @@ def at_bounds(found: Solution, quantile: float) -> tuple[Solution, dict[int, tup
         value = each.value(point[n])
         reach = [each.value(at) for at in each.bounds]
         size = 1.0 / low if high is None else high
+        slope = jacobian[:, n] * (-value * size if high is None else size / value)
+        others = np.delete(jacobian, n, axis=1)
+        # deviations by a step of that size which no other number makes up: less than two would leave it open
+        effect = float(np.linalg.norm(slope - others @ np.linalg.lstsq(others, slope)[0]))
+        wider = max(1.0, 2.0 / max(effect, LEAST_SIZE))
+        jacobian[:, n] = wider * slope
+        size *= wider
         parameters[n] = replace(
             each, start=value, low=reach[0], high=reach[1], size=size, is_inverse=high is None
         )
-        jacobian[:, n] *= -value * size if high is None else size / value
         point[n] = 0.0
     problem = replace(found.problem, parameters=tuple(parameters))
     return replace(found, problem=problem, point=point, jacobian=jacobian), bounds
