@@ -374,6 +374,8 @@ def test_limits_of_the_chain_that_are_reached_are_named(law):
     chains = (chain_of(), limited)
     free, held = (signals_of(simulated(LAB, law or LOOSE, each, task)) for each in chains)
     outputs = with_noise(free, 2)
+    # from where the run is taken
+    outputs["hub_angle"][0] = 0.0
     of_loop = {"references": {"hub_angle": task.hub_angle}, "law": law} if law else {"input": task.feedforward}
     run = Run(period=T, outputs=outputs, **of_loop)
     model = replace(fit_run(LAB, run, limited), sigma=(1e-3, 0.01), count=MODES)
