@@ -361,7 +361,7 @@ def test_a_wrong_arm_leaves_residuals_that_are_not_white():
     heavy = replace(LAB, payload=replace(LAB.payload, mass=0.3))
     found = fit(heavy, [], ["hub.inertia"], runs=[open_run(n=300)], chain=chain_of(), profile=False)
     assert not found.is_explained
-    assert "model rejected: residuals are not white (chance " in found.in_words
+    assert "model rejected: residuals are no white noise that is independent of the input (chance " in found.in_words
     assert found.verdict == "fitted, but the arm does not explain the data"
 
 

@@ -121,6 +121,8 @@ class RunResults(Solution):
         of_runs = self.parts[len(self.problem.responses) :]
         for each, residuals in zip(self.problem.runs, of_runs, strict=True):
             noise = "of sensors that the controller reads" if each.through_loop else "white at the output"
+            if each.disturbance:
+                noise = "white at the output, and a torque disturbance"
             effects = each.chain_effects(self._arm, self._value)
             for place, name in enumerate(each.run.names):
                 own = residuals.reshape(len(effects), -1)[place]
@@ -182,7 +184,7 @@ class RunResults(Solution):
         """Measured and computed signals of each run."""
         found = []
         for each in self.problem.runs:
-            at_output = replace(each, through_loop=False)
+            at_output = replace(each, through_loop=False, disturbance=())
             off = at_output.residuals(self._arm, self._value).reshape(len(each.sigma), -1)
             computed = each.measured + off * np.array(each.sigma)[:, None]
             found.append(RunCurves(each.run.names, each.run.t, each.measured, computed))
