@@ -34,7 +34,7 @@ from tfarm.dsp.pulse import pulse_transfer
 from tfarm.ensemble.space import space_of
 from tfarm.exact.appendix import Appendix
 from tfarm.exact.outputs import output
-from tfarm.fitting.runs import Run as MeasuredRun
+from tfarm.fitting.runs import RigRun
 from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.continuous import ContinuousLoop
 from tfarm.loop.loci import open_loop, reduced_locus
@@ -364,7 +364,7 @@ def fits(n=50_000, period=0.01):
     outputs = {name: y + s * e for (name, s), y, e in zip(sigma.items(), exact, noise, strict=True)}
     free = ["link.youngs_modulus", "hub.inertia", "link.damping", "drive.delay", "gain:root_moment"]
     start = {"link.youngs_modulus": 1.2 * arm.link.youngs_modulus, "hub.inertia": 0.8 * arm.hub.inertia}
-    run = MeasuredRun(period=period, outputs=outputs, input=u)
+    run = RigRun(period=period, outputs=outputs, input=u)
     began = time.process_time()
     tfarm.fit(arm, [], free, runs=[run], chain=Chain(sampling=Sampling(period=period)), start=start)
     yield Row(f"fit of five numbers from a run of {n} samples", 1, time.process_time() - began)

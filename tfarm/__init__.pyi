@@ -32,6 +32,7 @@ from tfarm.fitting.overlay import overlay as overlay
 from tfarm.fitting.prediction import predict as predict
 from tfarm.fitting.recording import read_recording as read_recording
 from tfarm.fitting.run_files import runs_of as runs_of
+from tfarm.fitting.runs import RigRun as RigRun
 from tfarm.fitting.together import fit_together as fit_together
 from tfarm.loop.locus import locus as locus
 from tfarm.loop.margins import margins as margins

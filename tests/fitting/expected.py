@@ -19,7 +19,7 @@ from tfarm.case import Case
 from tfarm.dsp.scenarios import Scenario
 from tfarm.dsp.simulate import Simulator
 from tfarm.fitting.experiment import excitations
-from tfarm.fitting.runs import Run
+from tfarm.fitting.runs import RigRun
 
 LAB = tfarm.load("sasaki2012-lab")
 CHAIN = Chain(sampling=Sampling(delay_samples=0.6))
@@ -43,7 +43,7 @@ def simulated(u, chain=CHAIN, bias=0.02):
 def fitted(u, clean, rng):
     """The fit of one record of these signals with noise of its own."""
     outputs = {name: clean.signal(name) + size * rng.standard_normal(u.size) for name, size in NOISE.items()}
-    run = Run(period=CHAIN.sampling.period, outputs=outputs, input=u, sigma=NOISE)
+    run = RigRun(period=CHAIN.sampling.period, outputs=outputs, input=u, sigma=NOISE)
     return tfarm.fit(LAB, [], FREE, runs=[run], chain=CHAIN, profile=False)
 
 

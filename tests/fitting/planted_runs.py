@@ -37,7 +37,7 @@ from tests.fitting.planted_commands import input_of, log, references_of, some_la
 from tfarm.arm.chain import Chain, Sampling
 from tfarm.arm.writing import KeyedArms
 from tfarm.fitting.fit import fit
-from tfarm.fitting.runs import DRIVE_GAIN, GAIN_KEY, Run
+from tfarm.fitting.runs import DRIVE_GAIN, GAIN_KEY, RigRun
 from tfarm.fitting.solve import nearest_minimum
 
 KINDS = ("open", "closed", "pushed", "joint", "elastic")
@@ -73,7 +73,7 @@ class Planted:
     corner: float  # of the analog filter, rad/s
     push: tuple  # duration, rest [s], and factor on the states
     settling: float | None  # s, in which the bias has come up before the record; None where it begins with it
-    run: Run
+    run: RigRun
 
     def plant_at(self, values, modes=MODES):
         """The plant of the arm that is fitted, at some numbers."""
@@ -276,7 +276,7 @@ def drawn(rng, kind):
     measured = dict(zip(names, seen[..., 0], strict=True))
     sigma = dict(zip(names, deviations(computer, names).tolist(), strict=True)) if rng.random() < 0.5 else {}
     recorded = u[:, 0] if law is None or rng.random() < 0.5 else None
-    run = Run(period=period, outputs=measured, input=recorded, references=computer.references, law=law, sigma=sigma)
+    run = RigRun(period=period, outputs=measured, input=recorded, references=computer.references, law=law, sigma=sigma)
     start = {key: value * (1 + rng.uniform(-OFF, OFF)) for key, value in truth.items()}
     return Planted(arm, other, body, truth, start, drive, computer, names, corner, (*push, factor), settling, run)
 

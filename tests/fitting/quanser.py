@@ -18,7 +18,7 @@ import tfarm
 from tfarm.arm.chain import load_chain
 from tfarm.arm.law_tables import load_law
 from tfarm.arm.writing import KeyedArms
-from tfarm.fitting.runs import Run, from_rest
+from tfarm.fitting.runs import RigRun, from_rest
 
 RIG = Path(__file__).parent.parent / "data" / "quanser-2dsfl"
 FITTED = ("10deg", "30deg", "neg_20deg", "neg_5deg")
@@ -45,7 +45,7 @@ def measured_runs(folder, angles):
             name = f"{controller}_step_{angle}_run01.mat"
             record = loadmat(Path(folder) / name)
             hub, deflection = record["X1_meas"].astype(float)[::5].T[:2]
-            yield Run(
+            yield RigRun(
                 period=0.01,
                 outputs={"hub_angle": hub, "root_moment": STIFFNESS * deflection},
                 references={"hub_angle": record["X1_ref"].astype(float)[::5, 0]},

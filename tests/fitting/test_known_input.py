@@ -20,7 +20,7 @@ from tfarm.fitting.intervals import confidence_intervals
 from tfarm.fitting.model import Problem, free_parameters
 from tfarm.fitting.run_model import fit_run
 from tfarm.fitting.run_numbers import with_disturbance
-from tfarm.fitting.runs import Run
+from tfarm.fitting.runs import RigRun
 from tfarm.fitting.solve import nearest_minimum, rescale_noise
 
 LAB = tfarm.load("sasaki2012-lab")
@@ -50,7 +50,7 @@ def closed_loop(seed, torque, count=800):
         u[k] = 2.0 * (wanted[k] - y[k]) - 0.8 * (y[k] - before) / PERIOD
         before = y[k]
         x = A @ x + B * (u[k] + w[k])
-    return Run(period=PERIOD, outputs={"hub_angle": y}, input=u)
+    return RigRun(period=PERIOD, outputs={"hub_angle": y}, input=u)
 
 
 def scores(seed, torque, *, is_predicted):

@@ -18,7 +18,7 @@ from tfarm.dsp.simulate import Simulator
 from tfarm.fitting.posterior import Posterior, PosteriorNumber
 from tfarm.fitting.residual_causes import cross_correlation
 from tfarm.fitting.run_files import load_run
-from tfarm.fitting.runs import Run
+from tfarm.fitting.runs import RigRun
 
 T = 0.01
 N = 1000
@@ -50,8 +50,8 @@ def planted(*, closed, arm=ARM, chain=CHAIN, friction=0.0, gain=1.0, seed=0, law
         disturbance = -friction * np.tanh(at.hub_rate / 0.02)
     outputs = {name: at.signal(name) + read[name] for name in NOISE}
     if closed:
-        return Run(period=T, outputs=outputs, references={"hub_angle": REFERENCE}, law=law)
-    return Run(period=T, outputs=outputs, input=torque)
+        return RigRun(period=T, outputs=outputs, references={"hub_angle": REFERENCE}, law=law)
+    return RigRun(period=T, outputs=outputs, input=torque)
 
 
 def with_stiffness(arm, factor):
@@ -88,7 +88,9 @@ def test_the_prediction_is_that_of_the_simulator_through_steps_and_limits():
     simulation = Simulator(Case(ARM, LAW, chain), task).run()
     assert simulation.saturated["torque"] > 20
     outputs = {name: simulation.at_samples.signal(name) for name in NOISE}
-    run = Run(period=T, outputs=outputs, references={"hub_angle": REFERENCE}, law=LAW, sigma=dict.fromkeys(NOISE, 1e-9))
+    run = RigRun(
+        period=T, outputs=outputs, references={"hub_angle": REFERENCE}, law=LAW, sigma=dict.fromkeys(NOISE, 1e-9)
+    )
     found = tfarm.predict(ARM, run, chain)
     # the modes beyond those of a run, and an offset that the loop without limits takes for the saturation
     free = replace(run, outputs={"hub_angle": outputs["hub_angle"]}, sigma={"hub_angle": 1e-9})

@@ -27,7 +27,7 @@ from tfarm.fitting.model import Problem, free_parameters
 from tfarm.fitting.posterior import load_posterior
 from tfarm.fitting.run_model import fit_run
 from tfarm.fitting.run_numbers import with_run_numbers
-from tfarm.fitting.runs import Run
+from tfarm.fitting.runs import RigRun
 from tfarm.fitting.whiteness import chance_of_white
 from tfarm.plots.frequency import fit_runs
 from tfarm.report.page import ArmReport
@@ -74,7 +74,7 @@ def open_run(arm=LAB, chain=None, n=500, bias=0.02, seed=1, times=1.0, **own):
     """A record in open loop, its command a torque over `times`."""
     u = command(n)
     found = simulated(arm, LOOSE, chain or chain_of(), task_of(u, 0 * u, bias))
-    return Run(period=T, input=u / times, outputs=with_noise(signals_of(found), seed), **own)
+    return RigRun(period=T, input=u / times, outputs=with_noise(signals_of(found), seed), **own)
 
 
 SPRUNG = replace(LAB, hub=replace(LAB.hub, stiffness=3.0, friction=0.05))
@@ -183,7 +183,7 @@ def test_under_a_controller_bias_and_offset_are_found_again():
     outputs = with_noise(signals_of(Simulator(case, task, count=MODES).controller(controller)), 4)
     outputs["root_moment"] += planted["offset of root_moment"]
     sigma = {name: SIGMA[name] for name in outputs}
-    run = Run(period=T, outputs=outputs, references={"hub_angle": reference}, law=SERVO, sigma=sigma)
+    run = RigRun(period=T, outputs=outputs, references={"hub_angle": reference}, law=SERVO, sigma=sigma)
     own = own_numbers(run, chain_of())
     for name, value in planted.items():
         assert abs(own[name][0] - value) < 4 * own[name][1] < max(value, 0.01)
@@ -194,7 +194,9 @@ def test_a_record_may_begin_while_the_arm_moves():
     u = command(1000)
     sim = simulated(LAB, LOOSE, chain_of(0.0), task_of(u, 0 * u))
     outputs = {name: values[500:] for name, values in signals_of(sim).items()}
-    run = Run(period=T, input=u[500:], outputs=outputs, sigma={name: float(np.std(x)) for name, x in outputs.items()})
+    run = RigRun(
+        period=T, input=u[500:], outputs=outputs, sigma={name: float(np.std(x)) for name, x in outputs.items()}
+    )
     model = fit_run(LAB, run, chain_of(0.0))
     assert model.is_moving
     left = abs(model.residuals(LAB, lambda place: math.nan).reshape(2, -1))
@@ -211,7 +213,7 @@ def test_a_record_may_be_finer_than_its_controller():
     for name in ("hub_angle", "root_moment"):
         fine = run.between.signal(name).reshape(-1, 3)
         outputs[name] = np.c_[run.at_samples.signal(name), fine].ravel()
-    record = Run(period=T / 4, outputs=outputs, references={"hub_angle": np.repeat(reference, 4)}, law=SERVO)
+    record = RigRun(period=T / 4, outputs=outputs, references={"hub_angle": np.repeat(reference, 4)}, law=SERVO)
     model = replace(fit_run(LAB, record, chain_of()), count=MODES)
     found = model.respond(LAB, lambda place: math.nan).outputs
     for each, right in zip(found, outputs.values(), strict=True):
@@ -270,7 +272,7 @@ def closed_run(inside, n=600, seed=5):
     task = task_of(0 * reference, reference, bias=0.02)
     sim = Simulator(Case(LAB, SERVO, chain_of()), task, count=MODES).controller(controller)
     outputs = {name: values + noise[name] for name, values in signals_of(sim, AT_HUB).items()}
-    return Run(period=T, outputs=outputs, references={"hub_angle": reference}, law=SERVO)
+    return RigRun(period=T, outputs=outputs, references={"hub_angle": reference}, law=SERVO)
 
 
 @pytest.mark.parametrize("inside", [False, True])
@@ -377,7 +379,7 @@ def test_limits_of_the_chain_that_are_reached_are_named(law):
     # from where the run is taken
     outputs["hub_angle"][0] = 0.0
     of_loop = {"references": {"hub_angle": task.hub_angle}, "law": law} if law else {"input": task.feedforward}
-    run = Run(period=T, outputs=outputs, **of_loop)
+    run = RigRun(period=T, outputs=outputs, **of_loop)
     model = replace(fit_run(LAB, run, limited), sigma=(1e-3, 0.01), count=MODES)
     effects = model.chain_effects(LAB, lambda place: math.nan)
     right = [abs(held[name] - free[name]).max() / sigma for name, sigma in zip(outputs, (1e-3, 0.01), strict=True)]

@@ -20,7 +20,7 @@ from tfarm.arm.chain import Chain, Sampling
 from tfarm.arm.law import Law
 from tfarm.arm.writing import KeyedArms
 from tfarm.fitting.run_model import fit_run
-from tfarm.fitting.runs import DRIVE_GAIN, Run, commanded
+from tfarm.fitting.runs import DRIVE_GAIN, RigRun, commanded
 from tfarm.fitting.together import fit_together
 
 LENGTHS = (0.30, 0.24, 0.18)
@@ -78,14 +78,14 @@ def open_loop(arm, rng, count):
     part = rng.choice([-0.1, 0.1], count // 40 + 1).repeat(10)[: count // 4]
     u = np.r_[part, -part, -part, part]
     outputs, _ = measured(arm, rng, u.size, input=u)
-    return Run(period=PERIOD, outputs=outputs, input=u)
+    return RigRun(period=PERIOD, outputs=outputs, input=u)
 
 
 def closed_loop(arm, rng, count, entries, law):
     """A step of the reference there and back."""
     reference = np.r_[np.zeros(20), np.full(count // 2, STEP), np.zeros(count)][:count]
     outputs, _ = measured(arm, rng, count, law=entries, references={"hub_angle": reference})
-    return Run(period=PERIOD, outputs=outputs, references={"hub_angle": reference}, law=law)
+    return RigRun(period=PERIOD, outputs=outputs, references={"hub_angle": reference}, law=law)
 
 
 def started(arm):

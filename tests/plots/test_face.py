@@ -22,7 +22,7 @@ from tfarm import Law
 from tfarm.digits import plain
 from tfarm.dsp import Chain, ReferenceShaping
 from tfarm.fitting.data import Measured
-from tfarm.fitting.runs import Run
+from tfarm.fitting.runs import RigRun
 from tfarm.loop.circle_crossings import sampled_map
 from tfarm.loop.loci import reduced_locus
 from tfarm.loop.nyquist import compress_radius
@@ -120,7 +120,7 @@ def pulse_run():
     t = 0.01 * np.arange(100)
     torque = np.where(t < 0.2, 0.5, 0.0)
     outputs = {"hub_angle": 0.1 * np.minimum(t, 0.2), "root_moment": 0.1 * np.sin(70 * t)}
-    return Run(period=0.01, outputs=outputs, input=torque)
+    return RigRun(period=0.01, outputs=outputs, input=torque)
 
 
 def sweep():

@@ -18,7 +18,7 @@ from tfarm.errors import require
 if TYPE_CHECKING:
     from tfarm.arm.chain import Chain
     from tfarm.fitting.recording import Recording
-    from tfarm.fitting.runs import Run
+    from tfarm.fitting.runs import RigRun
     from tfarm.fitting.signals import RecordSignal
 
 
@@ -359,7 +359,7 @@ def runs_of_options(
             "--decimate", min=1, help="keep one sample of this number, over which the input is constant"
         ),
     ] = 1,
-) -> "list[Run]":
+) -> "list[RigRun]":
     """Return the runs of an arm that --run names; none where it is not given."""
     from tfarm.fitting.run_files import runs_of
 
@@ -384,9 +384,9 @@ def together_of_options(
     shared: Annotated[
         str, typer.Option("--shared", metavar="KEY,KEY", help="free numbers that all arms have in common")
     ] = "",
-) -> "tuple[list[Arm], list[list[Run]], list[str]]":
+) -> "tuple[list[Arm], list[list[RigRun]], list[str]]":
     """Return the other arms of a fit, their runs as `read` reads one, and the keys of shared numbers."""
-    found: dict[str, tuple[Arm, list[Run]]] = {}
+    found: dict[str, tuple[Arm, list[RigRun]]] = {}
     for text in others or []:
         name, _, file = text.partition("=")
         require(

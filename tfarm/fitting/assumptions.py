@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from tfarm.fitting.data import Measured
     from tfarm.fitting.intervals import Fitted
-    from tfarm.fitting.runs import Run
+    from tfarm.fitting.runs import RigRun
 
 
 def assumptions_of(
@@ -25,7 +25,7 @@ def assumptions_of(
     fitted: Sequence[Fitted],
     in_words: str,
     responses: Sequence[Measured],
-    runs: Sequence[Run],
+    runs: Sequence[RigRun],
     not_determined: Sequence[str],
 ) -> tuple[str, ...]:
     """Return an arm's assumptions, marked where they name a fitted number, then the fit and its data."""

@@ -34,7 +34,7 @@ from tfarm.fitting.intervals import Fitted, confidence_intervals
 from tfarm.fitting.model import Problem, free_parameters, is_of_chain
 from tfarm.fitting.run_model import fit_run
 from tfarm.fitting.run_numbers import with_run_numbers
-from tfarm.fitting.runs import DRIVE_GAIN, GAIN_KEY, Run, commanded
+from tfarm.fitting.runs import DRIVE_GAIN, GAIN_KEY, RigRun, commanded
 from tfarm.fitting.solve import Solution, principal_axes
 from tfarm.records import frozen
 from tfarm.schema import Column, Percent, Quantity, Table, table, text
@@ -267,7 +267,7 @@ def problem_at_rest(
         arm, [key for key in keys if not is_of_chain(key)], start={}, bounds={}, priors={}
     )
     rest = np.zeros(count)
-    run = Run(
+    run = RigRun(
         period=chain.sampling.period,
         outputs=dict.fromkeys(noise, rest),
         input=rest,

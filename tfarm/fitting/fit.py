@@ -41,7 +41,7 @@ from tfarm.fitting.ratio import ratio_of
 from tfarm.fitting.result_rows import FittedResponse, RunResults
 from tfarm.fitting.run_model import fit_run
 from tfarm.fitting.run_numbers import with_run_numbers
-from tfarm.fitting.runs import DRIVE_GAIN, GAIN_KEY, Run, commanded
+from tfarm.fitting.runs import DRIVE_GAIN, GAIN_KEY, RigRun, commanded
 from tfarm.fitting.solve import (
     FIT_SEED,
     best_solution,
@@ -294,7 +294,7 @@ def fit(
     data: Sequence[Measured],
     free: Sequence[str],
     *,
-    runs: Sequence[Run] = (),
+    runs: Sequence[RigRun] = (),
     chain: Chain | None = None,
     start: Mapping[str, float] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
@@ -369,7 +369,7 @@ def _problem(
     bounds: Any,
     priors: Any,
     rings: Any,
-    runs: Sequence[Run],
+    runs: Sequence[RigRun],
     chain: Chain,
 ) -> Problem:
     """Return the search: the arm's numbers, then the sensors' own, one of a kind for each response."""

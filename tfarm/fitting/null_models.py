@@ -20,7 +20,7 @@ from tfarm.fitting.model import SENSOR_GAIN
 from tfarm.fitting.posterior import Posterior
 from tfarm.fitting.residual_causes import stiffened
 from tfarm.fitting.run_model import DRIVE_DELAY, FitRun, RunLoop, fit_run
-from tfarm.fitting.runs import DRIVE_GAIN, GAIN_KEY, Run
+from tfarm.fitting.runs import DRIVE_GAIN, GAIN_KEY, RigRun
 from tfarm.fitting.solve import FIT_SEED
 
 
@@ -33,7 +33,7 @@ class RunModel(NamedTuple):
     gains: Mapping[str, float]
     modes: int | None = None
 
-    def of(self, run: Run) -> FitRun:
+    def of(self, run: RigRun) -> FitRun:
         """Return a run as this arm has it, from rest."""
         found = fit_run(self.arm, run, self.chain)
         gains = tuple((name, place) for place, name in enumerate(self.gains))
@@ -62,7 +62,7 @@ class ComputedRun(NamedTuple):
     fitted: tuple[int, ...]
 
 
-def computed(model: RunModel, run: Run) -> ComputedRun:
+def computed(model: RunModel, run: RigRun) -> ComputedRun:
     """Return the outputs of a run through the whole chain, its offsets those of least squares in the linear loop.
 
     A led angle begins where it was first measured, within three deviations of its noise.
@@ -92,7 +92,7 @@ def computed(model: RunModel, run: Run) -> ComputedRun:
     return ComputedRun(outputs + offsets[:, None], offsets, by_offset, tuple(fitted))
 
 
-def constant_models(run: Run) -> dict[str, Real]:
+def constant_models(run: RigRun) -> dict[str, Real]:
     """Return each signal as its reference, or at rest, with the constant of least squares."""
     found = []
     for name, y in run.outputs.items():
@@ -142,7 +142,7 @@ def drawn_models(own: RunModel, posterior: Posterior, draws: int) -> Iterator[Ru
         yield own._replace(arm=family.at(dict(zip(posterior.keys, values, strict=True))))
 
 
-def noise_of(run: Run, left: Real) -> Real:
+def noise_of(run: RigRun, left: Real) -> Real:
     """Return the deviation (outputs,) of each sensor's noise: known, or of second differences of (outputs, n)."""
     # of white noise a second difference has six times the variance
     differences = np.diff(left, 2, axis=1)

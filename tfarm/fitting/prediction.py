@@ -53,7 +53,7 @@ from tfarm.fitting.residual_causes import (
     causes_of,
     residual_of,
 )
-from tfarm.fitting.runs import Run, from_rest
+from tfarm.fitting.runs import RigRun, from_rest
 from tfarm.records import frozen
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Column, Percent, Quantity, Table
@@ -103,7 +103,7 @@ class SignalRow(NamedTuple):
 class Prediction:
     """A run and its prediction: `measured` and `predicted` (outputs, n), and the half width of the band."""
 
-    run: Run
+    run: RigRun
     measured: Real
     predicted: Real
     half_band: Real | None
@@ -234,7 +234,7 @@ def unit_of(name: str) -> str:
 
 def predict(
     arm: Arm,
-    run: Run,
+    run: RigRun,
     chain: Chain | None = None,
     *,
     law: AnyLaw | None = None,
@@ -307,7 +307,7 @@ def predict(
     )
 
 
-def half_band(predicted: Real, sigma: Real, drawn: Iterator[RunModel], run: Run) -> Real:
+def half_band(predicted: Real, sigma: Real, drawn: Iterator[RunModel], run: RigRun) -> Real:
     """Return half the width (outputs, n) of the band of arms that are drawn, and of the noise (outputs,).
 
     Raises ParameterError for an arm whose loop grows without bound.
@@ -323,7 +323,7 @@ def half_band(predicted: Real, sigma: Real, drawn: Iterator[RunModel], run: Run)
 
 
 def signal_rows(
-    run: Run, measured: Real, models: Mapping[str, Real], shifts: Sequence[float]
+    run: RigRun, measured: Real, models: Mapping[str, Real], shifts: Sequence[float]
 ) -> Iterator[SignalRow]:
     """Yield the figures of each signal: as measured, as predicted, and of each null model."""
     for place, name in enumerate(run.names):
@@ -337,7 +337,7 @@ def signal_rows(
 
 
 def signal_row(
-    run: Run, name: str, origin: str, y: Real, start: float, shift: float, is_short: bool = False
+    run: RigRun, name: str, origin: str, y: Real, start: float, shift: float, is_short: bool = False
 ) -> SignalRow:
     """Return the figures of a signal that is `shift` more; of a null model, in short, the peak alone."""
     at = int(abs(y - start).argmax())
@@ -384,7 +384,7 @@ def ring_frequency(t: Real, y: Real) -> float | None:
     return float(found.poles[0].imag) / HERTZ
 
 
-def departures(case: Case, run: Run, count: int, longer: float, share: float = 0.05) -> list[float]:
+def departures(case: Case, run: RigRun, count: int, longer: float, share: float = 0.05) -> list[float]:
     """Return the times [s] after a measured run at which the computed hub angle is off its end, by a share of the step.
 
     The reference stays for that much `longer` [s], of 10,000 samples at most; `count` modes are in the loop.

@@ -33,17 +33,17 @@ from tfarm.dsp.discretise import discretise_law
 from tfarm.errors import MISSING, name_file, require
 from tfarm.fitting.posterior import Posterior, load_posterior
 from tfarm.fitting.recording import decimated, read_recording
-from tfarm.fitting.runs import Run, run_of
+from tfarm.fitting.runs import RigRun, run_of
 from tfarm.fitting.signals import RecordSignal, signal_of
 from tfarm.records import frozen
 
 
-def runs_of(texts: Sequence[str], arm: Arm, signals: Sequence[str] = (), decimate: int = 1) -> list[Run]:
+def runs_of(texts: Sequence[str], arm: Arm, signals: Sequence[str] = (), decimate: int = 1) -> list[RigRun]:
     """Return the runs of an arm that the command line means by "run.csv", or "run.csv=law.toml" under a law.
 
     `signals` name columns of each record as `read_recording` reads them; `decimate` keeps one sample of that number,
     where the input is held over them (`decimated`).
-    Raises ParameterError as these do and as `Run` does, for a law whose period is no multiple of the record's, and for
+    Raises ParameterError as these do and as `RigRun` does, for a law whose period is no multiple of the record's, and for
     a law that does not explain the recorded input.
     """
     named = [signal_of(text) for text in signals]
@@ -52,7 +52,7 @@ def runs_of(texts: Sequence[str], arm: Arm, signals: Sequence[str] = (), decimat
     return [read_run(text, arm, named, decimate) for text in texts]
 
 
-def read_run(text: str, arm: Arm, named: Sequence[RecordSignal], decimate: int) -> Run:
+def read_run(text: str, arm: Arm, named: Sequence[RecordSignal], decimate: int) -> RigRun:
     """Return one of them."""
     path, _, file = text.rpartition("=") if text.endswith(".toml") else (text, "", "")
     require(path, "--run", text, "write FILE, or FILE=LAW.toml of a record in closed loop")
@@ -83,7 +83,7 @@ def check_period(law: Law, period: float, file: str) -> None:
     require(is_multiple, "record", f"{period:.6g} s", remedy)
 
 
-def check_law(law: Law, run: Run, file: str) -> None:
+def check_law(law: Law, run: RigRun, file: str) -> None:
     """Raise ParameterError where a law leaves more than half of the recorded input unexplained.
 
     That is the root mean square of the input's difference from that of the law, over that of the input about its mean,
@@ -157,7 +157,7 @@ class RunTable(StrictTable):
 class MeasuredRun:
     """A run measured under the law of a file, and what is known of the arm: a posterior, the arm before a fit."""
 
-    run: Run
+    run: RigRun
     posterior: Posterior | None = None
     before: Arm | None = None
 
@@ -180,7 +180,7 @@ def load_run(name_or_path: AnyFile) -> MeasuredRun | None:
         }
         remedy = "has neither hub_angle [rad] nor root_moment [N m] with reference:hub_angle [rad]"
         require(outputs, "measured.file", table.file, remedy)
-        run = Run(
+        run = RigRun(
             period=found.period,
             outputs=outputs,
             references={"hub_angle": reference},

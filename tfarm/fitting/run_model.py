@@ -43,7 +43,7 @@ from tfarm.dsp.sensed import sensed_plant
 from tfarm.dsp.simulate import LinearLoop, quantisers, references_of
 from tfarm.errors import ParameterError, require
 from tfarm.fitting.held import modes_at_period
-from tfarm.fitting.runs import Run, from_rest
+from tfarm.fitting.runs import RigRun, from_rest
 from tfarm.records import frozen
 
 DRIVE_DELAY = "drive.delay"
@@ -82,7 +82,7 @@ class FitRun:
     One that `is_ideal` has no steps and limits of its chain.
     """
 
-    run: Run
+    run: RigRun
     chain: Chain
     count: int
     sigma: tuple[float, ...]
@@ -398,7 +398,7 @@ class FitRun:
 class RunLoop:
     """The controller of a run round its plant, a sample of it at every `ratio` of the record."""
 
-    run: Run
+    run: RigRun
     ratio: int
     linear: LinearLoop
 
@@ -433,7 +433,7 @@ class RunLoop:
         return np.repeat(u, self.ratio)[: self.run.count]
 
 
-def fit_run(arm: Arm, run: Run, chain: Chain) -> FitRun:
+def fit_run(arm: Arm, run: RigRun, chain: Chain) -> FitRun:
     """Return a run as a fit begins with it: deviations that are not known a tenth of their signal's.
 
     Under a controller with a reference of the hub's angle that is about its first measured value: an observer of the

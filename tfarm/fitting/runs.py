@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @frozen(kw_only=True)
-class Run:
+class RigRun:
     """A record of a rig in motion at samples every `period` [s], all arrays (n,) in SI units.
 
     `outputs` are measured signals by name ("hub_angle", "root_moment", "strain@0.05"), `input` is the commanded input
@@ -117,12 +117,12 @@ class Run:
         return float(self.period * (1 + np.flatnonzero(changes).max(initial=-1)))
 
 
-def run_of(recording: Recording, arm: Arm, law: Law | None = None) -> Run:
+def run_of(recording: Recording, arm: Arm, law: Law | None = None) -> RigRun:
     """Return the run that a record has of an arm: its columns by their names.
 
     The column of the arm's input ("hub_torque", "motor_current") is the commanded input, "reference:hub_angle" a
     reference, and every other column with the name of a signal is an output; the rest is left out.
-    Raises ParameterError as `Run` does.
+    Raises ParameterError as `RigRun` does.
     """
     columns = recording.signals
     driven = arm.input if law is None or law.input is None else law.input
@@ -136,7 +136,7 @@ def run_of(recording: Recording, arm: Arm, law: Law | None = None) -> Run:
     references = {
         name.removeprefix(REFERENCE): values for name, values in columns.items() if name.startswith(REFERENCE)
     }
-    return Run(
+    return RigRun(
         period=recording.period,
         outputs=outputs,
         input=columns.get(driven),
@@ -149,7 +149,7 @@ def run_of(recording: Recording, arm: Arm, law: Law | None = None) -> Run:
     )
 
 
-def from_rest(run: Run) -> tuple[Run, float]:
+def from_rest(run: RigRun) -> tuple[RigRun, float]:
     """Return a run in closed loop about its first hub angle, and that angle [rad], where it has a reference of it.
 
     So the arm is at rest at 0 there, and so is the controller; a constant angle changes nothing else in a linear loop.
@@ -168,7 +168,7 @@ DRIVE_GAIN = "drive.gain"
 GAIN_KEY = "motor.torque_constant"
 
 
-def commanded(arm: Arm, runs: Sequence[Run]) -> tuple[Arm, tuple[Run, ...]]:
+def commanded(arm: Arm, runs: Sequence[RigRun]) -> tuple[Arm, tuple[RigRun, ...]]:
     """Return the arm with a drive whose gain is its motor's torque constant, and the runs under its command.
 
     An arm without a motor gets one without gear, inertia and back-EMF: the command is its current.

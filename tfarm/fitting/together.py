@@ -19,7 +19,7 @@ from tfarm.fitting.fit import Fit, fit_of, renamed
 from tfarm.fitting.model import Problem, free_parameters, is_of_chain
 from tfarm.fitting.run_model import fit_run
 from tfarm.fitting.run_numbers import with_run_numbers
-from tfarm.fitting.runs import DRIVE_GAIN, Run, commanded
+from tfarm.fitting.runs import DRIVE_GAIN, RigRun, commanded
 from tfarm.stopping import Progress
 
 
@@ -27,7 +27,7 @@ def fit_together(
     arms: Sequence[Arm],
     free: Sequence[str],
     *,
-    runs: Sequence[Sequence[Run]],
+    runs: Sequence[Sequence[RigRun]],
     shared: Sequence[str],
     chain: Chain | None = None,
     start: Mapping[str, float] | None = None,
@@ -69,7 +69,7 @@ def fit_together(
 
 
 def _problem(
-    pairs: Sequence[tuple[Arm, Sequence[Run]]],
+    pairs: Sequence[tuple[Arm, Sequence[RigRun]]],
     free: Sequence[str],
     shared: Sequence[str],
     given: Sequence[Mapping[str, Any]],
