@@ -43,8 +43,8 @@ def runs_of(texts: Sequence[str], arm: Arm, signals: Sequence[str] = (), decimat
 
     `signals` name columns of each record as `read_recording` reads them; `decimate` keeps one sample of that number,
     where the input is held over them (`decimated`).
-    Raises ParameterError as these do and as `RigRun` does, for a law whose period is no multiple of the record's, and for
-    a law that does not explain the recorded input.
+    Raises ParameterError as these do and as `RigRun` does, for a law whose period is no multiple of the record's, and
+    for a law that does not explain the recorded input.
     """
     named = [signal_of(text) for text in signals]
     for each in named:
