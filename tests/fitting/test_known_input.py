@@ -50,7 +50,7 @@ def closed_loop(seed, torque, count=800):
         u[k] = 2.0 * (wanted[k] - y[k]) - 0.8 * (y[k] - before) / PERIOD
         before = y[k]
         x = A @ x + B * (u[k] + w[k])
-    return RigRun(period=PERIOD, outputs={"hub_angle": y}, input=u)
+    return RigRun(period=PERIOD, outputs={"hub_angle": y}, input=u, is_disturbed=True)
 
 
 def scores(seed, torque, *, is_predicted):
@@ -71,14 +71,14 @@ def share_inside(found):
     return float((abs(found) < 1.96).mean())
 
 
-def test_output_errors_of_white_sensor_noise_have_no_bias():
+def test_output_errors_of_white_sensor_noise_are_within_their_intervals():
     # u knows the noise of the past alone
     found = np.array([scores(seed, 0.0, is_predicted=False) for seed in range(4)])
     assert abs(found).max() < 4
     assert abs(found.mean(axis=0)).max() < 1.5
 
 
-def test_prediction_errors_of_a_torque_have_no_bias_where_output_errors_have():
+def test_prediction_errors_of_a_torque_are_within_their_intervals_where_output_errors_are_not():
     by_output = np.array([scores(seed, TORQUE, is_predicted=False) for seed in range(4)])
     by_prediction = np.array([scores(seed, TORQUE, is_predicted=True) for seed in range(4)])
     assert share_inside(by_output) < 0.5

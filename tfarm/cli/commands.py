@@ -293,6 +293,7 @@ def fit(
     prior: Annotated[list[Any] | None, typer.Option(metavar="KEY=MEAN,STD", parser=pair)] = None,
     mode: Annotated[list[str] | None, typer.Option(metavar="N=HZ,RATIO")] = None,
     initial: Annotated[str | None, typer.Option(metavar="rest|free")] = None,
+    disturbed: bool = False,
     covariance: bool = False,
     read: Any = runs_of_options,
     together: Any = together_of_options,
@@ -317,6 +318,7 @@ def fit(
     prior: prior mean and deviation
     mode: mode of a ring-down: 1=2.52hz,0.006, with standard deviations 1=2.52hz~0.01,0.006~0.001
     initial: motion of the runs at their first sample; by default free
+    disturbed: a torque disturbs the runs, or a controller that is not known answers: prediction errors
     covariance: intervals by the covariance alone, without profiles
     save: write the fitted arm to this TOML file, with the chain of its runs
     report: write the pages of the fitted arm
@@ -328,10 +330,12 @@ def fit(
 
     subject = load_arm(arm, theory)
     measured = [data_of(text) for text in data or []]
-    runs = [replace(each, initial=cast("Any", initial)) for each in read(subject)]
+    how: Any = {"initial": initial or "free", "is_disturbed": disturbed}
+    runs = [replace(each, **how) for each in read(subject)]
     page = None
     if not runs:
-        refuse({"initial": initial, **chain.keywords}, "is of runs: give --run too")
+        own = {"initial": initial, "disturbed": disturbed or None}
+        refuse({**own, **chain.keywords}, "is of runs: give --run too")
     for each in measured:
         ratio.check_unit(subject, each)
     others, more, shared = together(read, theory)

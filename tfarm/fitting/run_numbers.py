@@ -70,7 +70,7 @@ DISTURBANCE = "disturbance"
 
 
 def with_disturbance(problem: Problem) -> Problem:
-    """Return the problem with a torque on the input of its runs without a controller, its deviations free.
+    """Return the problem with a torque on the input of its runs that are disturbed, its deviations free.
 
     One number an arm and signal: the deviation of a white torque, held over a sample, over that of the signal's noise.
     The sizes of the prediction errors, which are not the sensors' noise, follow from the residuals.
@@ -80,7 +80,8 @@ def with_disturbance(problem: Problem) -> Problem:
     places: dict[str, int] = {}
     runs = []
     for each in problem.runs:
-        if each.run.input is not None and each.run.law is None:
+        if each.run.is_disturbed:
+            assert each.run.input is not None
             name = f":{families[each.arm].arm.name}" if problem.others else ""
             keys = [f"{DISTURBANCE}:{signal}{name}" for signal in each.run.names]
             for key, sigma in zip(keys, each.sigma, strict=True):

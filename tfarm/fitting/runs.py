@@ -32,7 +32,8 @@ class RigRun:
     of the plant, held from each sample to the next.  Under a `law` it may be left out, and `references` of the
     hub's angle, rate or moment take its place; a `law` that is None is an open loop.
     `sigma` has the standard deviations of outputs that are known; others follow from the residuals.  `initial` is
-    "rest" or "free" at the first sample; by default an open loop is free, and a closed one rests.
+    "rest" or "free" at the first sample, by default free.  One that `is_disturbed` has its input, and a torque besides
+    that is not known: of friction, or where a controller that is not known answers it.
     Raises ParameterError for arrays of other lengths, values that are no numbers, and a record without outputs, without
     input and references, or of an open loop without an input.
     """
@@ -43,7 +44,8 @@ class RigRun:
     references: Mapping[str, Real] = field(default_factory=dict)
     law: Law | None = None
     sigma: Mapping[str, float] = field(default_factory=dict)
-    initial: Literal["rest", "free"] | None = None
+    initial: Literal["rest", "free"] = "free"
+    is_disturbed: bool = False
     source: str = "array"
     digest: str = ""
     note: str = ""
@@ -60,7 +62,7 @@ class RigRun:
             require(np.isfinite(values).all(), name, "nan or inf", "finite numbers; cut the record there")
         for name in self.outputs:
             check_signal(name, "output")
-        must_be_known("initial", self.initial or "rest", ("rest", "free"))
+        must_be_known("initial", self.initial, ("rest", "free"))
         for name in self.references:
             require(name in AT_HUB, "reference", name, f"of one of {', '.join(AT_HUB)}")
         for name, value in self.sigma.items():
@@ -72,6 +74,8 @@ class RigRun:
             require(self.input is not None, "input", MISSING, remedy)
         else:
             object.__setattr__(self, "law", as_law(self.law))
+            remedy = "is of a record with its input and without the controller that was running"
+            require(not self.is_disturbed, "disturbed", True, remedy)
             remedy = "a closed loop has a reference: a column reference:hub_angle, for instance"
             require(self.references or self.input is not None, "references", MISSING, remedy)
 

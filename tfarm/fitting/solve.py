@@ -290,8 +290,8 @@ def solution_of_runs(problem: Problem, draws: int) -> Solution:
             continued_minimum(replace(best.problem, runs=around), [*points, best.point], least)
         )
         best = min(best, other, key=lambda each: each.misfit)
-    is_driven = any(each.run.law is None for each in best.problem.runs)
-    if is_driven and best.chance_of_white <= LEAST_CHANCE:
+    is_disturbed = any(each.run.is_disturbed for each in best.problem.runs)
+    if is_disturbed and best.chance_of_white <= LEAST_CHANCE:
         part = replace(problem, runs=tuple(each.until(least) for each in problem.runs))
         other = solution_with_disturbance(best, [start, continued_minimum(part, points, least).point])
         # each ratio has to explain more than noise alone would
@@ -331,6 +331,10 @@ def solution_with_disturbance(found: Solution, starts: Sequence[Real]) -> Soluti
     ratios = np.log([0.01, 0.1, 1.0, 10.0])
     points = [np.r_[each, np.full(more, ratio)] for each in (found.point, *starts) for ratio in ratios]
     first = sorted(points, key=partial(sum_of_squares, problem))[:2]
+    # an arm that grows without bound has no stationary predictor
+    first = [each for each in first if math.isfinite(sum_of_squares(problem, each))]
+    if not first:
+        return found
     ends = [nearest_minimum(problem, each, change=1e-6) for each in first]
     return rescale_noise(min(ends, key=lambda each: each.chi_squared))
 
