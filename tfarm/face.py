@@ -72,6 +72,7 @@ class CaseFace(Case):
     step = Question("step")
     simulate = Question("simulate")
     reference = Question("reference")
+    predict = Question("predict")
     export = Question("export")
     explore = Question("explore")
     study = Question("study")

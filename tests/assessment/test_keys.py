@@ -179,7 +179,7 @@ PUBLIC = {  # the functions that users call, which refuse before any work
 def test_every_key_has_a_stage_and_every_consumer_states_stages_that_there_are():
     chain = {f"{table}.{each.name}" for table in CHAIN_TABLES for each in fields(getattr(Chain(), table))}
     assert chain == set(CHANGES) == set(STAGE_OF) - set(ARM_KEYS)
-    others = ("law", "weights", "measured", "sensor", *CHAIN_TABLES)
+    others = ("law", "weights", "measured", "sensor", "drive", *CHAIN_TABLES)
     arm = {key.removeprefix("top.") for key in file_keys() if key.partition(".")[0] not in others}
     tables = {"link", "hub", "clamp", "joint", "motor", "attachment", "gauge", "payload"}
     filled = {"link.material", "link.section"}  # by numbers that have their own keys

@@ -12,7 +12,7 @@ from tfarm.cli.running import commands_of, whole_command
 
 PIN = Path("tests/golden/files/pin.toml").read_text(encoding="utf-8")
 HUBS = {"pinned": "inertia = 0.0", "locked": "inertia = inf", "spring": "inertia = 0.05\nstiffness = 20.0"}
-OF_NO_ARM = {"new", "frf", "ring", "proof audit", "proof validate", "proof glossary", "completion"}
+OF_NO_ARM = {"new", "frf", "ring", "predict", "proof audit", "proof validate", "proof glossary", "completion"}
 REASONS = {
     "locked": r"hub\.inertia = inf|locked hub",
     "spring": r"spring to ground|paper's",

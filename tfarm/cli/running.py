@@ -220,8 +220,10 @@ def usage(error: Any) -> str:
     if text.startswith("No such command"):
         word = text.split("'")[1].lower()
         ours = hints()["commands"] | hints()["renamed"]
-        near = get_close_matches(word, ours, 1, cutoff=0.8)
-        if near == [word] or (near and "Did you mean" not in text):
+        # those that Typer has found among the commands
+        found = text.split("'")[3::2]
+        near = get_close_matches(word, [*found, *ours], 1, cutoff=0.8)
+        if near and near[0] not in found:
             return f"No such command '{word}'. Did you mean \"{ours[near[0]]}\"?"
     if "param" in vars(error):
         return text.removeprefix("Invalid value for ").replace("'", "", 2)

@@ -110,6 +110,11 @@ class Experiment:
         return self.arm.name
 
     @property
+    def frequencies(self) -> Real:
+        """The arm's natural frequencies [rad/s] below half the sampling rate."""
+        return flexible_frequencies(self.arm, math.pi / self.period)
+
+    @property
     def t(self) -> Real:
         """The times of the samples [s]."""
         return np.asarray(self.period * np.arange(self.input.size))

@@ -472,7 +472,7 @@ def save_fit(fit: Fit, path: Path) -> None:
     """
     files = [path, *(path.with_name(f"{each.name}{path.suffix}") for each in fit.arms[1:])]
     for file, arm in zip(files, fit.arms, strict=True):
-        posterior = fit.posterior.of_arm(arm.name.removesuffix("-fitted"))
+        posterior = fit.posterior.of_arm(arm.name)
         write_file(file, file_text(arm, fit.chain).encode(), key="--save")
         if file.is_file() and not is_standard_output(file) and posterior.numbers:
             content = f"{posterior.model_dump_json(indent=1)}\n".encode()

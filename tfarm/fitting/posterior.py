@@ -83,7 +83,8 @@ class Posterior(StrictTable):
 
     def of_arm(self, name: str) -> Posterior:
         """Return the distribution of the numbers of one of several arms, under the keys of its file."""
-        rows = [n for n, key in enumerate(self.keys) if key.partition(":")[2] in ("", name)]
+        own = name.removesuffix("-fitted")
+        rows = [n for n, key in enumerate(self.keys) if key.partition(":")[2] in ("", own)]
         numbers = [self.numbers[n].model_copy(update={"key": self.keys[n].partition(":")[0]}) for n in rows]
         covariance = self.matrix[np.ix_(rows, rows)].tolist()
         return self.model_copy(update={"arm": name, "numbers": numbers, "covariance": covariance})

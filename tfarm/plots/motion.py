@@ -52,7 +52,6 @@ from tfarm.plots.style import (
 )
 from tfarm.schema import text
 from tfarm.spectrum import Modes
-from tfarm.spectrum.table import flexible_frequencies
 from tfarm.tuner import LearningCurves, Tuning
 
 ALONG = "distance from the hub, x [m]"
@@ -352,7 +351,7 @@ def draw_experiment(found: Experiment, *, ax: Sequence[Axes]) -> None:
         middle.plot(found.t, values, color=colour, lw=1.0, label=signal_words(name)[0])
     sizes = 2 * abs(np.fft.rfft(found.input)) / found.input.size
     lower.plot(np.fft.rfftfreq(found.input.size, found.period), sizes, color=BLUE, lw=1.0)
-    for omega in flexible_frequencies(found.arm, math.pi / found.period).tolist():
+    for omega in found.frequencies.tolist():
         lower.axvline(omega / (2 * math.pi), color=INK, lw=0.8, ls=DOTTED)
     amplitude = f"amplitude [{found.arm.input_unit}]"
     along_hertz(lower, "linear", xlim=(0.0, 0.5 / found.period), ylabel=amplitude)
