@@ -59,6 +59,7 @@ def test_the_inertia_of_a_rigid_arm_has_the_interval_of_its_closed_form():
     assert step.intervals["hub.inertia"] * STIFF.hub.inertia / J == pytest.approx(1.959964 * share, rel=0.01)
 
 
+@pytest.mark.survey
 def test_fits_of_such_records_scatter_as_expected_and_have_its_intervals(found):
     """Few draws: the sum of z^2 of each number within 99.98 % of chi-squared; `tests.fitting.expected` takes more."""
     clean = simulated(found.input)

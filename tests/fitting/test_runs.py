@@ -272,7 +272,7 @@ def closed_run(inside, n=600, seed=5):
     task = task_of(0 * reference, reference, bias=0.02)
     sim = Simulator(Case(LAB, SERVO, chain_of()), task, count=MODES).controller(controller)
     outputs = {name: values + noise[name] for name, values in signals_of(sim, AT_HUB).items()}
-    return RigRun(period=T, outputs=outputs, references={"hub_angle": reference}, law=SERVO)
+    return RigRun(period=T, outputs=outputs, references={"hub_angle": reference}, law=SERVO, initial="rest")
 
 
 @pytest.mark.parametrize("inside", [False, True])

@@ -29,6 +29,7 @@ def two_rulers():
     return arms, runs, fit_of(arms, runs, profile=False)
 
 
+@pytest.mark.survey
 def test_what_three_rulers_share_is_one_number_and_the_rest_is_each_ones_own():
     arms, _, found = two_rulers()
     numbers = {each.key: each for each in found.parameters}

@@ -350,7 +350,7 @@ def fit(
     }
     if others:
         refuse({"data": data, "mode": mode, "report": report}, "is of one arm: leave it out, or --with")
-        more = [[replace(each, initial=cast("Any", initial)) for each in own] for own in more]
+        more = [[replace(each, **how) for each in own] for own in more]
         found = tfarm.fit_together([subject, *others], keys, runs=[runs, *more], shared=shared, **of)
     else:
         rings = [model.mode_of(text) for text in mode or []]
