@@ -312,6 +312,9 @@ def another_mode(residual: Residual) -> ResidualCause:
         return ResidualCause("another mode", "none found", Percent(0.0))
     best = minimize(left, min(starts, key=left), method="Nelder-Mead", options={"maxiter": 80, "xatol": 1e-4})
     frequency, ratio = map(math.exp, best.x)
+    # at the end of the search: a smooth curve that fits anything slow, and no mode
+    if ratio > 0.095:
+        return ResidualCause("another mode", "none of a damping ratio below 0.1", Percent(0.0))
     size = f"{general(frequency / HERTZ, 4)} Hz, damping ratio {general(ratio, 2)}"
     return ResidualCause("another mode", size, Percent(1 - best.fun / total))
 
