@@ -13,7 +13,7 @@ from typing import Any
 import typer
 from typer.exceptions import TyperException
 
-from tfarm.cli import arm_files, commands, control, designing, experiments, pages  # noqa: F401  each adds its commands
+from tfarm.cli import arm_files, commands, control, designing, measuring, pages  # noqa: F401  each adds its commands
 from tfarm.cli.app import app
 from tfarm.cli.progress import discard, print_line, progress
 from tfarm.errors import CertificationError, ConvergenceError, ParameterError, TfarmError, require
