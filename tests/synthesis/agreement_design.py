@@ -13,7 +13,7 @@ with gains up to 6 dB larger and smaller, and with a further delay of a period.
 Its evaluations of laws are `share` times those that design counts, and a figure of the survey.
 
 As the tip of many arms is at rest when the motion ends, the settling time and a twentieth of the dominant time constant
-are compared.
+are compared, and as laws below the floor of speed pay for it in what is minimised, times what they pay.
 
     python -m tests.synthesis.agreement_design FIRST LAST SEED FILE     # appends a line of JSON a rig
     python -m tests.synthesis.agreement_design summary FILE
@@ -166,13 +166,14 @@ class Other:
         self.score = np.inf
 
     def value_of(self, law):
-        """The settling time and a share of the dominant time constant [s]."""
+        """The settling time and a share of the dominant time constant [s], times what a slow law pays."""
         judge = self.judge
         entries = judge.entries(law)
         loop = measures_of(judge, entries)
         speed = float(loop.dominant_time_constant(first_frequency(judge.arm))[0])
         # as of tfarm's score, where the tip of a slow loop does not settle in the longest record
-        return min(self.slew.of(law)["settling_time_s"], 100 * speed) + SHARE_OF_SPEED * speed
+        value = min(self.slew.of(law)["settling_time_s"], 100 * speed) + SHARE_OF_SPEED * speed
+        return value * float(np.exp(slowness(judge, entries)[0]))
 
     def of_model(self, x, limits):
         """Scores (m,) of points (n, m) by the model, any value above their limits."""

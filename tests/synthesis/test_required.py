@@ -34,11 +34,11 @@ def test_a_peak_that_leaves_the_band_is_a_slope_of_the_time_of_settling():
     t = np.array([-1.0, 0.0, 0.5, 1.0, 2.0])
     for peak, expected in [(0.99, 0.0), (1.0, 0.0), (1.1, 0.5), (1.2, 1.0), (5.0, 1.0)]:
         away = 0.02 * np.array([9.0, peak, peak, 0.9, 0.5])
-        found = near_settling(t, away, 1.0, 0.0 if peak <= 1 else 1.0)
+        found = near_settling(t, away, 1.0, 0.0 if peak <= 1 else 1.0, 0.2)
         assert found == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("rig", [(1, 42), (1, 151), (2, 5), (2, 127)])
+@pytest.mark.parametrize("rig", [(1, 42), (1, 151), (2, 5), (2, 127), (3, 27)])
 def test_laws_of_rigs_that_are_hard_to_meet(rig):
     """No null controller and no violation left.
 
@@ -46,6 +46,7 @@ def test_laws_of_rigs_that_are_hard_to_meet(rig):
     The exact delay margin of (1, 151) follows four fifths of a shift: few corrections leave a violation.
     Mode 1 of (2, 5) grows by 3e-7 a sample with the delay required, about that of the hold: slopes hardly see it.
     The gains of (2, 127) to six digits are beyond a jump of the delay margin, where L touches the unit circle.
+    (3, 27) lacks 2e-5 of Ms: a simplex of a tenth of its gains does not become as small in thirty steps.
     """
     task = some_task(np.random.default_rng(rig))
     found = find_near_map(task, [NamedArm("rig", task.arm, {})], None, "whole")
@@ -59,12 +60,15 @@ def test_laws_of_rigs_that_are_hard_to_meet(rig):
         ((1, 31), (9.205245502360686e-07, -1.517427011046661), 0.015),
         ((1, 57), (749.7529891296905, -11.374124999859198), 0.004),
         ((2, 12), (1.10628e7, 1.37499e7), 0.004),
+        ((3, 9), (0.0003607588227181699, 80.36664531114542), 0.004),
+        ((3, 35), (3445.3369860746097, -0.033459809752130885), 0.004),
     ],
 )
 def test_the_law_found_is_as_good_as_another_that_meets_the_requirements(rig, gains, margin):
     """The tip of (1, 31) settles sooner under slower poles; the models of (1, 57) are stricter than its loop.
 
-    The time of settling of (2, 12) jumps to either side of the best gains, where a peak leaves the band.
+    The time of settling of (2, 12) jumps to either side of the best gains, where a peak leaves the band; those of
+    (3, 9) are along such a jump.  The best law of (3, 35) has 16 times the shortest time constant.
     """
     task = some_task(np.random.default_rng(rig))
     law = task.form.record_of(gains)

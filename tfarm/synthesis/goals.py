@@ -41,7 +41,7 @@ from tfarm.synthesis.measures import LoopMeasures
 from tfarm.synthesis.models import DesignModel
 from tfarm.synthesis.requirements import MEASURES, NORM, Requirement
 from tfarm.synthesis.search import Search, Worst, sobol
-from tfarm.synthesis.slew_measures import NEAR_SETTLING, SlewMeasures
+from tfarm.synthesis.slew_measures import SLOPES, SlewMeasures
 from tfarm.synthesis.structures import Entry
 from tfarm.synthesis.worst_case import NamedArm
 
@@ -202,23 +202,23 @@ class Goal:
         return max(found)
 
     def simulated_score(self, judge: Any, slew: SlewMeasures, law: AnyLaw) -> Real:
-        """Return the score of one law with its slew, and that without the jumps of the settling time (2,).
+        """Return the score of one law with its slew, and those with `SLOPES` for the jumps of the settling time (3,).
 
         `LOST` where it is unstable on the model, or has no figure.
         """
         score = float(judge.score(law))
         if score >= LOST or not self.by_simulation:
-            return np.full(2, score)
+            return np.full(3, score)
         figures = slew.of(law)
         for each, shift in self.shifted(0):
             if each.measure.of_slew:
                 score += self.weight * max(each.violation(figures[each.name]) + shift, 0.0)
         if not _is_of_slew(self.minimised):
-            return np.full(2, min(score, LOST))
+            return np.full(3, min(score, LOST))
         speed = float(self.value(judge, measures_of(judge, judge.entries(law)))[0])
-        values = np.full(2, figures[self.minimised])
+        values = np.full(3, figures[self.minimised])
         if self.minimised == "settling_time_s":
-            values[1] = figures[NEAR_SETTLING]
+            values[1:] = [figures[name] for name in SLOPES]
         if self.minimised.endswith("settling_time_s"):
             # a tip that does not settle in the longest record: of such laws the fastest is the best
             values = np.minimum(values, 100.0 * speed) + SHARE_OF_SPEED * speed
@@ -288,7 +288,7 @@ def _is_of_slew(name: str) -> bool:
 
 
 def simulated_scores(goal: Goal, judges: Sequence[Any]) -> Callable[[AnyLaw], Real]:
-    """Return a function from a law to its largest scores on any arm, with its slew (2,)."""
+    """Return a function from a law to its largest scores on any arm, with its slew (3,)."""
     # modes of a slew that is simulated hundreds of times
     modes = 8
     names = (goal.minimised, *(each.name for each in goal.requirements))
@@ -316,21 +316,21 @@ def by_slews(goal: Goal, judges: Sequence[Any], found: Search) -> list[tuple[flo
     candidates = [x for _, x in found.found] + list(points[:, near].T)
     low, high = form.box
     chosen: list[Real] = []
-    for n in np.argsort([scores(form.record_at(x))[1] for x in candidates]):
+    for n in np.argsort([scores(form.record_at(x))[-1] for x in candidates]):
         x = candidates[n]
         if len(chosen) < 3 and all((abs(x - other) > 0.05 * (high - low)).any() for other in chosen):
             chosen.append(x)
-    ends = [polished(goal, judges, form, x, 1.0, 0.5, jumps=False) for x in chosen]
+    ends = [polished(goal, judges, form, x, 1.0, 0.5, slope=-1) for x in chosen]
     return sorted(ends, key=itemgetter(0)) or found.found
 
 
 def polished(
-    goal: Goal, judges: Sequence[Any], form: Any, x: Real, size: float, share: float, jumps: bool = True
+    goal: Goal, judges: Sequence[Any], form: Any, x: Real, size: float, share: float, slope: int = 1
 ) -> tuple[float, Real]:
     """Return the best score and point of a simplex that begins at x, with the slew simulated on every arm.
 
-    `size` and `share` are of its usual size and its usual number of steps.  Without `jumps` of the settling time it
-    goes down a slope in their place; the best of its points is that with them.
+    `size` and `share` are of its usual size and its usual number of steps.  It goes down a `slope`, by its place among
+    the scores, where the settling time jumps; the best of its points is that with the jumps.
     """
     scores = simulated_scores(goal, judges)
     points: list[tuple[float, Real]] = []
@@ -338,7 +338,7 @@ def polished(
     def score(at: Real) -> float:
         found = scores(form.record_at(at)).tolist()
         points.append((found[0], at.copy()))
-        return float(found[int(not jumps)])
+        return float(found[slope])
 
     low, high = form.box
     step = 0.02 * size * (high - low)

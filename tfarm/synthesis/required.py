@@ -159,10 +159,13 @@ class RequirementTask:
             judges = tuple(self.judge(each.arm, goal, step) for each in named)
             worst = Worst(judges[::-1])
             share = 1.0
+            size = 1.0
             if chosen is not None and chosen.violation < SMALL:
                 # a small correction moves the best law little
                 found = chosen.search._replace(found=[(chosen.score, chosen.x)])
                 share = 0.25
+                # a simplex that is too large ends before it is as small as the correction
+                size = max(100 * chosen.violation, 1e-3)
             else:
                 found = search(worst, form, self.tell, near, effort if attempt == 0 else "near")
                 if attempt == 0 and effort == "whole" and found.found[0][0] < LOST:
@@ -175,7 +178,7 @@ class RequirementTask:
             if effort == "sketch":
                 return RequiredLaw(Worst(judges), found, *found.found[0], law, goal, ())
             candidates = (
-                self.examine(named, judges, found, x, goal, share, share)
+                self.examine(named, judges, found, x, goal, min(size, share), share)
                 for score, x in found.found
                 if score < LOST
             )

@@ -28,8 +28,8 @@ TIP = "tip_displacement"
 LENGTHS = (1, 6)
 # samples of a longer record: the time of a search
 MOST_SAMPLES = 10_000
-# the figure of `near_settling`
-NEAR_SETTLING = "near_settling_s"
+# the figures of `near_settling`, and the widths of their slopes in bands
+SLOPES = {"nearer_settling_s": 0.01, "near_settling_s": 0.2}
 
 
 @frozen
@@ -63,7 +63,7 @@ class SlewMeasures:
 
         Those but the settling time, and those of parts, are of the first record.
         """
-        names = [NEAR_SETTLING, *(name for name, each in MEASURES.items() if each.of_slew)]
+        names = [*SLOPES, *(name for name, each in MEASURES.items() if each.of_slew)]
         case = Case(self.arm, law, self.chain)
         found: dict[str, float] = {}
         impulses = impulses_of(self.known, self.chain, law)
@@ -82,7 +82,7 @@ class SlewMeasures:
                 ]
                 found = {
                     "settling_time_s": np.inf,
-                    NEAR_SETTLING: np.inf,
+                    **dict.fromkeys(SLOPES, np.inf),
                     "overshoot": max(0.0, float((y / final).max()) - 1.0) if travel else 0.0,
                     "residual_moment": residuals[0],
                     "residual_raw_moment_rms": residuals[1],
@@ -92,9 +92,10 @@ class SlewMeasures:
                 found |= self._figures(run)
             if settled is not None:
                 found["settling_time_s"] = settled
-                found[NEAR_SETTLING] = near_settling(
-                    t - task.busy_until, abs(y - final), abs(travel), settled
-                )
+                for name, width in SLOPES.items():
+                    found[name] = near_settling(
+                        t - task.busy_until, abs(y - final), abs(travel), settled, width
+                    )
                 break
         return found
 
@@ -119,13 +120,12 @@ class SlewMeasures:
         return found
 
 
-def near_settling(t: Real, away: Real, scale: float, settled: float) -> float:
+def near_settling(t: Real, away: Real, scale: float, settled: float, width: float) -> float:
     """Return the least of t + (settled - t) min(1, v/w) over times `t` (n,) up to that at which a signal settles [s].
 
     v is by how much the largest deviation from t on is above the band, in bands: a time of settling that jumps where a
-    peak leaves the band goes up along a slope of width w.
+    peak leaves the band goes up along a slope of that width w.
     """
-    width = 0.2
     largest = np.maximum.accumulate(away[::-1])[::-1]
     excess = largest / (SETTLING_BAND * (scale or float(away.max()))) - 1
     is_before = (t >= 0) & (t < settled)
