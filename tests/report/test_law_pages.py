@@ -219,9 +219,9 @@ def test_what_is_measured_and_predicted_of_the_real_controllers():
         assert computed.rms == pytest.approx(np.sqrt(np.mean((found.predicted[0] - angle) ** 2)))
         for moment in (found.measured[1], found.predicted[1]):
             assert moment[np.flatnonzero(abs(moment) > 0.5)[0]] < 0  # the tip lags behind first, there and here
-        # dry friction: without it the prediction is not that of the rig, and the page says so
+        # dry friction: without it the prediction is not that of the rig, no other change makes it so, and the page says it
         assert found.residuals[0].white < 1e-9
-        assert found.causes[0].removed > 1 / 3
+        assert 0.3 < found.causes[0].removed < 0.75
 
 
 def test_a_measured_run_is_put_in_the_place_of_the_slew():
