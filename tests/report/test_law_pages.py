@@ -219,7 +219,7 @@ def test_what_is_measured_and_predicted_of_the_real_controllers():
         assert computed.rms == pytest.approx(np.sqrt(np.mean((found.predicted[0] - angle) ** 2)))
         for moment in (found.measured[1], found.predicted[1]):
             assert moment[np.flatnonzero(abs(moment) > 0.5)[0]] < 0  # the tip lags behind first, there and here
-        # dry friction: without it the prediction is not that of the rig, no other change makes it so, and the page says it
+        # dry friction: no linear change makes the prediction that of the rig, and the page says so
         assert found.residuals[0].white < 1e-9
         assert 0.3 < found.causes[0].removed < 0.75
 
