@@ -431,6 +431,8 @@ def test_what_belongs_to_runs_is_refused_without_one(capsys):
     for option in (("--initial", "rest"), ("--period", "0.01")):
         assert "--run" in refused(capsys, "fit", "sasaki2012-lab", "--free", "hub.inertia", *option)
     assert "initial" in str(refusal(open_run, n=100, initial="moving"))
+    for free, words in ((["gain"], "gain:SIGNAL"), (["drive.delay", "drive.delay"], "named twice")):
+        assert words in str(refusal(fit, LAB, [], ["hub.inertia", *free], runs=[open_run(n=100)]))
 
 
 def test_the_pages_of_a_fit_have_its_runs():

@@ -29,6 +29,8 @@ from tfarm.fitting.data import CONFIDENCE, Measured, must_be_measured, noise_of,
 from tfarm.fitting.intervals import BetterError, Fitted, confidence_intervals
 from tfarm.fitting.misses import Miss, Remedy, misses_of, remedies_of
 from tfarm.fitting.model import (
+    SENSOR_DELAY,
+    SENSOR_GAIN,
     FitResponse,
     Problem,
     RingMode,
@@ -388,6 +390,9 @@ def _problem(
     for each in data:
         ratio_of(arm, each)
     responses = tuple(FitResponse(each, noise_of(each)) for each in data)
+    for key in (SENSOR_GAIN, SENSOR_DELAY):
+        remedy = "is of the sensor of a response (--data); of a run there are gain:SIGNAL and drive.delay"
+        require(responses or key not in free, "free", key, remedy)
     of_runs = tuple(fit_run(arm, each, chain) for each in runs)
     subject = Problem(family, numbers, responses, tuple(rings), of_runs).with_sensors(free)
     subject = with_run_numbers(subject, free, start or {}, bounds or {}, priors or {})
