@@ -48,6 +48,7 @@ def test_what_three_rulers_share_is_one_number_and_the_rest_is_each_ones_own():
     assert one.link.youngs_modulus != other.link.youngs_modulus
 
 
+@pytest.mark.survey
 def test_closed_loops_are_predicted_to_their_noise_and_better_than_by_any_null_model():
     arms, _, found = two_rulers()
     for name, number, errors in predictions(np.random.default_rng(572), arms, found, count=300):

@@ -38,7 +38,7 @@ def test_a_peak_that_leaves_the_band_is_a_slope_of_the_time_of_settling():
         assert found == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("rig", [(1, 42), (1, 151), (2, 5), (2, 127), (3, 27)])
+@pytest.mark.parametrize("rig", thinned([((2, 127),), ((1, 42),), ((3, 27),), ((1, 151),), ((2, 5),)], 2))
 def test_laws_of_rigs_that_are_hard_to_meet(rig):
     """No null controller and no violation left.
 
@@ -56,13 +56,16 @@ def test_laws_of_rigs_that_are_hard_to_meet(rig):
 
 @pytest.mark.parametrize(
     ("rig", "gains", "margin"),
-    [
-        ((1, 31), (9.205245502360686e-07, -1.517427011046661), 0.015),
-        ((1, 57), (749.7529891296905, -11.374124999859198), 0.004),
-        ((2, 12), (1.10628e7, 1.37499e7), 0.004),
-        ((3, 9), (0.0003607588227181699, 80.36664531114542), 0.004),
-        ((3, 35), (3445.3369860746097, -0.033459809752130885), 0.004),
-    ],
+    thinned(
+        [
+            ((3, 9), (0.0003607588227181699, 80.36664531114542), 0.004),
+            ((2, 12), (1.10628e7, 1.37499e7), 0.004),
+            ((1, 31), (9.205245502360686e-07, -1.517427011046661), 0.015),
+            ((1, 57), (749.7529891296905, -11.374124999859198), 0.004),
+            ((3, 35), (3445.3369860746097, -0.033459809752130885), 0.004),
+        ],
+        4,
+    ),
 )
 def test_the_law_found_is_as_good_as_another_that_meets_the_requirements(rig, gains, margin):
     """The tip of (1, 31) settles sooner under slower poles; the models of (1, 57) are stricter than its loop.
