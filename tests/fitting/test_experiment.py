@@ -162,7 +162,7 @@ def test_the_record_is_read_with_measured_columns_and_its_c_is_the_same_to_the_l
     [
         ({"--free": "link.mass"}, "free = 'link.mass'"),
         ({"--free": ","}, "name what is free"),
-        ({"--free": "hub.inertia,delay"}, "free = 'delay': is of a frequency response"),
+        ({"--free": "hub.inertia,delay"}, "free = 'delay': is of the sensor of a response"),
         ({"--free": "drive.delay,drive.delay"}, "is named twice"),
         ({"--free": "gain:tip_angle"}, "no run has that signal"),
         ({"--duration": "0.1"}, "--duration = 0.1: 0.64 to 1000 s"),

@@ -18,9 +18,10 @@ import tfarm
 from tests.shared import refusal
 from tests.shell import answer, run
 from tfarm.errors import ConvergenceError, ParameterError
-from tfarm.fitting.decays import fit_ringdown, whiteness
+from tfarm.fitting.decays import fit_ringdown
 from tfarm.fitting.model import mode_of
 from tfarm.fitting.recording import Recording, read_recording
+from tfarm.fitting.whiteness import chance_of_lags
 
 T = 0.01
 t = T * np.arange(150)
@@ -126,7 +127,7 @@ def test_a_half_that_does_not_determine_a_frequency_has_none():
 
 def test_white_noise_is_white_with_the_probability_computed():
     rng = np.random.default_rng(4)
-    found = np.array([whiteness(rng.standard_normal(200)) for _ in range(400)])
+    found = np.array([chance_of_lags(rng.standard_normal(200)) for _ in range(400)])
     for level in (0.1, 0.5):
         assert (found < level).mean() == pytest.approx(level, abs=4 * np.sqrt(level * (1 - level) / 400))
 

@@ -15,6 +15,7 @@ from tests.shared import refusal
 from tests.shell import answer, refused
 from tfarm.arm import AT_HUB, Law
 from tfarm.arm.chain import Actuator, Chain, Converters, Sampling, load_chain
+from tfarm.arm.law_tables import load_law
 from tfarm.arm.writing import to_toml
 from tfarm.case import Case
 from tfarm.dsp.discretise import acting_law
@@ -28,13 +29,14 @@ from tfarm.fitting.posterior import load_posterior
 from tfarm.fitting.run_model import fit_run
 from tfarm.fitting.run_numbers import with_run_numbers
 from tfarm.fitting.runs import RigRun
-from tfarm.fitting.whiteness import chance_of_white
+from tfarm.fitting.whiteness import chance_of_independent, chance_of_lags, chance_of_white
 from tfarm.plots.frequency import fit_runs
 from tfarm.report.page import ArmReport
 from tfarm.report.response_sections import fit_section
 from tfarm.schema import to_dict
 
 LAB = tfarm.load("sasaki2012-lab")
+QUANSER = Path(__file__).parent.parent / "data" / "quanser-2dsfl"
 T = 0.01
 MODES = 8
 SERVO = tfarm.HubFeedback(Kp=2.0, K1=0.7, K2=0.1)
@@ -243,6 +245,56 @@ def test_a_ring_or_a_drift_is_not_white(more):
     noise = np.random.default_rng(8).standard_normal(600)
     assert chance_of_white(noise) > 0.01
     assert chance_of_white(noise + more) < 1e-3
+
+
+def test_a_wide_band_is_not_white():
+    """A third of the spectrum, an eighth larger: its first correlations are those of noise, no line is large."""
+    spectrum = np.fft.rfft(np.random.default_rng(2).standard_normal(4000))
+    spectrum[:700] *= 1.12
+    e = np.fft.irfft(spectrum)
+    assert chance_of_lags(e) > 0.01
+    assert chance_of_white(e) < 0.005
+
+
+def test_white_residuals_depend_on_the_input_as_seldom_as_their_chance_says():
+    rng = np.random.default_rng(6)
+    u = rng.choice([-1.0, 1.0], 60).repeat(10)
+    chances = np.array([chance_of_independent(e, u[None]) for e in rng.standard_normal((600, u.size))])
+    below = int((chances < 0.05).sum())
+    assert binom.isf(1 - 1e-4, chances.size, 0.05) <= below <= binom.isf(1e-4, chances.size, 0.05)
+    # a late response to the input, a fiftieth of the variance
+    more = np.r_[np.zeros(12), 0.15 * np.sin(0.4 * np.arange(25)) * 0.9 ** np.arange(25)]
+    assert chance_of_independent(rng.standard_normal(u.size) + np.convolve(u, more)[: u.size], u[None]) < 1e-3
+
+
+def test_an_observer_had_come_to_rest_where_its_run_begins():
+    """By another angle of hub and reference, which turn freely, nothing changes: the state of a law of them neither."""
+    rig, law = tfarm.load(str(QUANSER / "rig.toml")), load_law(QUANSER / "lqg.toml")
+    t = 0.01 * np.arange(300)
+    reference = 0.3 * np.minimum(t, 1.0)
+    runs = []
+    for start in (0.0, -0.2):
+        outputs = {"hub_angle": 0.9 * reference + start, "root_moment": np.sin(t)}
+        runs.append(
+            RigRun(period=0.01, outputs=outputs, references={"hub_angle": reference + start}, law=law, initial="rest")
+        )
+    damped = replace(rig, link=replace(rig.link, damping=1e-3))
+    found = [fit_run(damped, run, Chain()).residuals(damped, lambda _: math.nan) for run in runs]
+    np.testing.assert_allclose(*found, rtol=0, atol=1e-9 * abs(found[0]).max())
+
+
+@pytest.mark.parametrize("law", [None, SERVO])
+def test_the_motion_at_the_start_is_free_unless_a_run_rests(law):
+    """The first mode released, by the simulator: nothing is left of it, and much where the arm should rest."""
+    task = replace(task_of(np.zeros(300), np.zeros(300)), tip_offset=0.01)
+    outputs = signals_of(simulated(LAB, law or LOOSE, chain_of(), task))
+    of_loop = {"references": {"hub_angle": np.zeros(300)}, "law": law} if law else {"input": np.zeros(300)}
+    left = {}
+    for initial in ("free", "rest"):
+        run = RigRun(period=T, outputs=outputs, initial=initial, **of_loop)
+        own = replace(fit_run(LAB, run, chain_of()), count=MODES)
+        left[initial] = abs(own.residuals(LAB, lambda _: math.nan)).max()
+    assert left["free"] < 1e-6 * left["rest"]
 
 
 # ------------------------------------------------------------ fits

@@ -44,6 +44,28 @@ RecordName = Annotated[
 pair = name_and(numbers("KEY=NUMBER,NUMBER", 2))
 
 
+def conditions_of_runs(
+    *,
+    initial: Annotated[
+        str | None,
+        typer.Option(
+            "--initial",
+            metavar="rest|free",
+            help="motion of the runs at their first sample; by default free",
+        ),
+    ] = None,
+    disturbed: Annotated[
+        bool,
+        typer.Option(
+            "--disturbed",
+            help="a torque disturbs the runs, or a controller that is not known answers: prediction errors",
+        ),
+    ] = False,
+) -> dict[str, Any]:
+    """Return the conditions of runs in a fit, as `RigRun` has them."""
+    return {"initial": initial or "free", "is_disturbed": disturbed}
+
+
 @measuring_command(
     epilog="fit rig.toml --data tip_acceleration/hub_angle=sweep.csv --free link.youngs_modulus,delay --json"
 )
@@ -58,8 +80,7 @@ def fit(
     bounds: Annotated[list[Any] | None, typer.Option(metavar="KEY=LO,HI", parser=pair)] = None,
     prior: Annotated[list[Any] | None, typer.Option(metavar="KEY=MEAN,STD", parser=pair)] = None,
     mode: Annotated[list[str] | None, typer.Option(metavar="N=HZ,RATIO")] = None,
-    initial: Annotated[str | None, typer.Option(metavar="rest|free")] = None,
-    disturbed: bool = False,
+    how: Any = conditions_of_runs,
     covariance: bool = False,
     read: Any = runs_of_options,
     together: Any = together_of_options,
@@ -83,8 +104,6 @@ def fit(
     bounds: bounds of a number
     prior: prior mean and deviation
     mode: mode of a ring-down: 1=2.52hz,0.006, with standard deviations 1=2.52hz~0.01,0.006~0.001
-    initial: motion of the runs at their first sample; by default free
-    disturbed: a torque disturbs the runs, or a controller that is not known answers: prediction errors
     covariance: intervals by the covariance alone, without profiles
     save: write the fitted arm to this TOML file, with the chain of its runs
     report: write the pages of the fitted arm
@@ -96,12 +115,10 @@ def fit(
 
     subject = load_arm(arm, theory)
     measured = [data_of(text) for text in data or []]
-    how: Any = {"initial": initial or "free", "is_disturbed": disturbed}
-    runs = [replace(each, **how) for each in read(subject)]
+    runs = [replace(each, **how()) for each in read(subject)]
     page = None
     if not runs:
-        own = {"initial": initial, "disturbed": disturbed or None}
-        refuse({**own, **chain.keywords}, "is of runs: give --run too")
+        refuse({**how.keywords, **chain.keywords}, "is of runs: give --run too")
     for each in measured:
         ratio.check_unit(subject, each)
     others, more, shared = together(read, theory)
@@ -116,7 +133,7 @@ def fit(
     }
     if others:
         refuse({"data": data, "mode": mode, "report": report}, "is of one arm: leave it out, or --with")
-        more = [[replace(each, **how) for each in own] for own in more]
+        more = [[replace(each, **how()) for each in own] for own in more]
         found = tfarm.fit_together([subject, *others], keys, runs=[runs, *more], shared=shared, **of)
     else:
         rings = [model.mode_of(text) for text in mode or []]

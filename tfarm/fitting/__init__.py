@@ -19,7 +19,7 @@
 `fit`: the fitted arm, and arms drawn from its posterior.
 `result_rows`: rows of a fit, of its responses and of its runs.
 `together`: one fit of several arms with numbers that they share.
-`assumptions`: what the file of a fitted arm says of its numbers.
+`assumptions`: what the file of a fitted arm has on its numbers.
 `misses`: responses that the fitted curve misses, and the changes that would help.
 `posterior`: the distribution of the fitted numbers, and their scatter between records.
 """

@@ -23,12 +23,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
-from scipy.special import chdtrc, stdtrit
+from scipy.special import stdtrit
 
 from tfarm.arrays import Complex, Real
 from tfarm.errors import ConvergenceError, require
 from tfarm.fitting.data import CONFIDENCE
 from tfarm.fitting.resonances import least_projected, project
+from tfarm.fitting.whiteness import autocovariance, chance_of_lags
 from tfarm.records import frozen
 from tfarm.response.frequency import HERTZ
 from tfarm.schema import Quantity
@@ -154,7 +155,7 @@ def fit_ringdown(
     squares = float(found.e @ found.e)
     # of the signal and of w: smaller differences are rounding
     rounding = 1e-9
-    white = 1.0 if squares <= y.size * (rounding * abs(y).max()) ** 2 else whiteness(found.e)
+    white = 1.0 if squares <= y.size * (rounding * abs(y).max()) ** 2 else chance_of_lags(found.e)
     notes = [recording.note] if recording.note else []
     if white < NOT_WHITE:
         chance = f"{white:.1g}" if white > 1e-9 else "below 1e-09"
@@ -221,7 +222,7 @@ def by_part(t: Real, y: Real, poles: Complex) -> tuple[Real, Real]:
     variance = np.full(w.size, np.inf)
     found = nearest_sum(t - t[0], y, poles) if y.size > 2 * count_parameters(w.size) else None
     if found is not None:
-        spread = found.covariance(is_white=whiteness(found.e) >= NOT_WHITE)
+        spread = found.covariance(is_white=chance_of_lags(found.e) >= NOT_WHITE)
         _, of_w, of_a, of_b = np.diag(spread)[:-1].reshape(4, w.size)
         # deviations of the amplitude of an oscillation that is determined: noise has 4
         variance = np.where(found.amplitude**2 > 8.0**2 * (of_a + of_b) / 2, of_w, np.inf)
@@ -353,27 +354,10 @@ def starting_poles(t: Real, y: Real, modes: int) -> Complex:
 
 def _meat(J: Real, e: Real) -> Real:
     """Return J' R J with the residuals' autocovariances r_k, tapered (1 - k/M), M twice the last significant lag."""
-    r = _autocovariance(e)
+    r = autocovariance(e)
     most = max(2, e.size // 3)
     # deviations, 1/sqrt(n), of an autocorrelation of white noise
     (clear,) = np.nonzero(abs(r[:most]) > 2.5 * r[0] / math.sqrt(e.size))
     lags = min(most, 2 * clear.max(initial=0) + 1)
     tapered = r[:lags] * (1 - np.arange(lags) / lags)
     return J.T @ np.apply_along_axis(np.convolve, 0, J, np.r_[tapered[:0:-1], tapered], "same")
-
-
-def whiteness(e: Real) -> float:
-    """Return the probability of first autocorrelations as large as these in white noise (Ljung and Box 1978)."""
-    r = _autocovariance(e)
-    n = e.size
-    if r[0] == 0:
-        return 1.0
-    lags = np.arange(1, min(20, n // 5) + 1)
-    Q = n * (n + 2) * ((r[lags] / r[0]) ** 2 / (n - lags)).sum()
-    return float(chdtrc(lags.size, Q))
-
-
-def _autocovariance(e: Real) -> Real:
-    from scipy.signal import correlate
-
-    return correlate(e, e)[e.size - 1 :] / e.size

@@ -30,11 +30,10 @@ from tfarm.arrays import Real
 from tfarm.dsp.simulate import quantisers
 from tfarm.errors import MISSING, did_you_mean, require
 from tfarm.fitting.data import check_signal
+from tfarm.fitting.fit import problem_of
 from tfarm.fitting.intervals import Fitted, confidence_intervals
-from tfarm.fitting.model import Problem, free_parameters, is_of_chain
-from tfarm.fitting.run_model import fit_run
-from tfarm.fitting.run_numbers import with_run_numbers
-from tfarm.fitting.runs import DRIVE_GAIN, GAIN_KEY, RigRun, commanded
+from tfarm.fitting.model import Problem
+from tfarm.fitting.runs import RigRun
 from tfarm.fitting.solve import Solution, principal_axes
 from tfarm.records import frozen
 from tfarm.schema import Column, Percent, Quantity, Table, table, text
@@ -265,28 +264,10 @@ def problem_at_rest(
     arm: Arm, free: Sequence[str], noise: Mapping[str, float], chain: Chain, count: int
 ) -> Problem:
     """Return the fit of the free numbers to a record of signals with that noise, without motion yet."""
-    if DRIVE_GAIN in free:
-        arm, _ = commanded(arm, ())
-    keys = [GAIN_KEY if key == DRIVE_GAIN else key for key in free]
-    family, numbers = free_parameters(
-        arm, [key for key in keys if not is_of_chain(key)], start={}, bounds={}, priors={}
-    )
     rest = np.zeros(count)
-    run = RigRun(
-        period=chain.sampling.period,
-        outputs=dict.fromkeys(noise, rest),
-        input=rest,
-        sigma=noise,
-    )
-    problem = with_run_numbers(
-        Problem(family, numbers, (), (), (fit_run(arm, run, chain),)), keys, {}, {}, {}
-    )
-    known = [each.key for each in problem.parameters]
-    require(known, "free", "nothing", "name what is free, such as link.youngs_modulus")
-    for key in keys:
-        require(keys.count(key) == 1, "free", key, "is named twice; once is enough")
-        require(key in known, "free", key, "is of a frequency response; of a record it is gain:SIGNAL")
-    return problem
+    period = chain.sampling.period
+    run = RigRun(period=period, outputs=dict.fromkeys(noise, rest), input=rest, sigma=noise)
+    return problem_of(arm, [], free, runs=[run], chain=chain)
 
 
 def scaled_signals(problem: Problem, shape: Real, limits: Mapping[str, float]) -> dict[str, Real]:

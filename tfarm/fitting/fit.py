@@ -310,18 +310,14 @@ def fit(
     `free` are keys of the arm's TOML file, and "gain" and "delay" of each response's sensor.  Of `runs`, sampled
     through `chain` (by default 10 ms, ideal), there are "drive.gain" (torque over a command in any unit), "drive.delay"
     (dead time [s]) and a sensor's "gain:root_moment"; biases, offsets and the motion at the start are free anyway.
-    `start`, `bounds` and
-    `priors` (mean, deviation) are by key, in SI units; `rings` are decays of single modes.  With `profile` each
-    interval is that of the profile likelihood, otherwise of the covariance; `progress` gets (done, total, what).
+    `start`, `bounds` and `priors` (mean, deviation) are by key, in SI units; `rings` are decays of single modes.  With
+    `profile` each interval is that of the profile likelihood, otherwise of the covariance; `progress` gets (done,
+    total, what).
     Raises ParameterError for a key that is none, and for more numbers than data.
     """
-    must_be_arm(arm)
-    wanted = [*free]
-    if DRIVE_GAIN in wanted:
-        arm, runs = commanded(arm, runs)
-        given = [renamed(each) for each in (dict.fromkeys(free), start, bounds, priors)]
-        wanted, start, bounds, priors = [*given[0]], *given[1:]
-    subject = _problem(arm, data, wanted, start, bounds, priors, rings, runs, chain or Chain())
+    subject = problem_of(
+        arm, data, free, runs=runs, chain=chain, start=start, bounds=bounds, priors=priors, rings=rings
+    )
     return fit_of(subject, profile, progress)
 
 
@@ -363,27 +359,38 @@ def renamed(given: Mapping[str, Any] | None) -> dict[str, Any]:
     return found
 
 
-def _problem(
+def problem_of(
     arm: Arm,
     data: Any,
     free: Any,
-    start: Any,
-    bounds: Any,
-    priors: Any,
-    rings: Any,
-    runs: Sequence[RigRun],
-    chain: Chain,
+    *,
+    runs: Sequence[RigRun] = (),
+    chain: Chain | None = None,
+    start: Mapping[str, float] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    rings: Sequence[RingMode] = (),
 ) -> Problem:
-    """Return the search: the arm's numbers, then the sensors' own, one of a kind for each response."""
+    """Return the search of a fit: the arm's numbers, then the sensors' own, one of a kind for each response.
+
+    Raises ParameterError as `fit` does.
+    """
     must_be_arm(arm)
+    free = [str(key) for key in free]
+    for key in free:
+        require(free.count(key) == 1, "free", key, "is named twice; once is enough")
+    if DRIVE_GAIN in free:
+        arm, runs = commanded(arm, runs)
+    wanted, start, bounds, priors = (renamed(each) for each in (dict.fromkeys(free), start, bounds, priors))
+    free = [*wanted]
     data = tuple(data) if isinstance(data, Iterable) and not isinstance(data, str) else (data,)
     for each in data:
         must_be_measured(each)
     remedy = "give at least one measured response, a run, or a decay (--mode)"
     require(data or rings or runs, "data", 0, remedy)
-    keys = [str(key) for key in free if not is_of_chain(key)]
+    keys = [key for key in free if not is_of_chain(key)]
     given = [
-        {key: value for key, value in (each or {}).items() if not is_of_chain(key)}
+        {key: value for key, value in each.items() if not is_of_chain(key)}
         for each in (start, bounds, priors)
     ]
     family, numbers = free_parameters(arm, keys, start=given[0], bounds=given[1], priors=given[2])
@@ -393,9 +400,9 @@ def _problem(
     for key in (SENSOR_GAIN, SENSOR_DELAY):
         remedy = "is of the sensor of a response (--data); of a run there are gain:SIGNAL and drive.delay"
         require(responses or key not in free, "free", key, remedy)
-    of_runs = tuple(fit_run(arm, each, chain) for each in runs)
+    of_runs = tuple(fit_run(arm, each, chain or Chain()) for each in runs)
     subject = Problem(family, numbers, responses, tuple(rings), of_runs).with_sensors(free)
-    subject = with_run_numbers(subject, free, start or {}, bounds or {}, priors or {})
+    subject = with_run_numbers(subject, free, start, bounds, priors)
     count = len(subject.parameters)
     require(count, "free", "nothing", "name what is free, such as link.youngs_modulus")
     size = subject.residuals(np.zeros(count)).size
@@ -473,11 +480,12 @@ def stable_share(arms: Sequence[Arm], ranges: Sequence[tuple[float, float]]) -> 
 def save_fit(fit: Fit, path: Path) -> None:
     """Write the fitted arm with the chain of its runs, and its posterior to a file of the same name.
 
-    Only the arm where that is a stream.  Other arms of the fit have files of their names beside it.
+    Only the arm where that is a stream.  Other arms of the fit have files of their names in its folder.
     """
     files = [path, *(path.with_name(f"{each.name}{path.suffix}") for each in fit.arms[1:])]
-    for file, arm in zip(files, fit.arms, strict=True):
-        posterior = fit.posterior.of_arm(arm.name)
+    families = (fit.problem.family, *fit.problem.others)
+    for file, family, arm in zip(files, families, fit.arms, strict=True):
+        posterior = fit.posterior.of_arm(family.arm.name, arm.name)
         write_file(file, file_text(arm, fit.chain).encode(), key="--save")
         if file.is_file() and not is_standard_output(file) and posterior.numbers:
             content = f"{posterior.model_dump_json(indent=1)}\n".encode()

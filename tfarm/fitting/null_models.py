@@ -35,10 +35,10 @@ class RunModel(NamedTuple):
 
     def of(self, run: RigRun) -> FitRun:
         """Return a run as this arm has it, from rest."""
-        found = fit_run(self.arm, run, self.chain)
+        found = fit_run(self.arm, replace(run, initial="rest"), self.chain)
         gains = tuple((name, place) for place, name in enumerate(self.gains))
         count = found.count if self.modes is None else self.modes
-        return replace(found, is_moving=False, gains=gains, count=count)
+        return replace(found, gains=gains, count=count)
 
     def value(self, place: int) -> float:
         """Return the gain of that place."""

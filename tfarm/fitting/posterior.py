@@ -81,10 +81,12 @@ class Posterior(StrictTable):
         whole = self.matrix + OPEN_DEVIATION**2 * unknown @ unknown.T
         return self.model_copy(update={"covariance": whole.tolist(), "not_determined": []})
 
-    def of_arm(self, name: str) -> Posterior:
-        """Return the distribution of the numbers of one of several arms, under the keys of its file."""
-        own = name.removesuffix("-fitted")
-        rows = [n for n, key in enumerate(self.keys) if key.partition(":")[2] in ("", own)]
+    def of_arm(self, before: str, name: str) -> Posterior:
+        """Return the distribution of the numbers of one of several arms, under the keys of its file.
+
+        `before` is the name that the arm had in the fit, `name` that of the fitted one.
+        """
+        rows = [n for n, key in enumerate(self.keys) if key.partition(":")[2] in ("", before)]
         numbers = [self.numbers[n].model_copy(update={"key": self.keys[n].partition(":")[0]}) for n in rows]
         covariance = self.matrix[np.ix_(rows, rows)].tolist()
         return self.model_copy(update={"arm": name, "numbers": numbers, "covariance": covariance})

@@ -245,7 +245,7 @@ def predict(
     gains: Mapping[str, float] | None = None,
     draws: int = 20,
 ) -> Prediction:
-    """Return a run beside its prediction by an arm, with null models, a band, and what the prediction leaves.
+    """Return a run and its prediction by an arm, with null models, a band, and what the prediction leaves.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ class RunSignal(NamedTuple):
             "chance of white residuals",
             digits=3,
             key="chance_of_white",
-            help="probability that white noise is as far from white, by Ljung and Box and by Fisher",
+            help="probability that white noise is as far from white, by its correlations and its spectrum",
         ),
     ]
     chain: Annotated[
@@ -118,16 +118,15 @@ class RunResults(Solution):
     ]:
         """A row a signal."""
         rows = []
-        of_runs = self.parts[len(self.problem.responses) :]
-        for each, residuals in zip(self.problem.runs, of_runs, strict=True):
+        for each, residuals in self.of_runs:
             noise = "of sensors that the controller reads" if each.through_loop else "white at the output"
             if each.disturbance:
                 noise = "white at the output, and a torque disturbance"
             effects = each.chain_effects(self._arm, self._value)
             for place, name in enumerate(each.run.names):
-                own = residuals.reshape(len(effects), -1)[place]
                 unit = signal_words(name)[1]
-                found = (each.sigma[place], unit, noise, chance_of_white(own), float(effects[place]))
+                chance = chance_of_white(residuals[place])
+                found = (each.sigma[place], unit, noise, chance, float(effects[place]))
                 rows.append(RunSignal(each.run.source, name, *found))
         return rows
 

@@ -58,7 +58,6 @@ def with_run_numbers(
     for key in free:
         if key != DRIVE_DELAY and ":" not in key:
             continue
-        require([*free].count(key) == 1, "free", key, "is named twice; once is enough")
         if not problem.others or key in shared:
             add(key, key, problem.runs)
             continue

@@ -23,6 +23,11 @@ from tfarm.records import frozen
 if TYPE_CHECKING:
     from tfarm.fitting.recording import Recording
 
+# free number of a fit: torque at the hub over what was commanded, in whatever unit that is
+DRIVE_GAIN = "drive.gain"
+# the number of the arm that it is
+GAIN_KEY = "motor.torque_constant"
+
 
 @frozen(kw_only=True)
 class RigRun:
@@ -164,12 +169,6 @@ def from_rest(run: RigRun) -> tuple[RigRun, float]:
     outputs = {**run.outputs, "hub_angle": run.outputs["hub_angle"] - start}
     references = {**run.references, "hub_angle": run.references["hub_angle"] - start}
     return replace(run, outputs=outputs, references=references), start
-
-
-# free number of a fit: torque at the hub over what was commanded, in whatever unit that is
-DRIVE_GAIN = "drive.gain"
-# the number of the arm that it is
-GAIN_KEY = "motor.torque_constant"
 
 
 def commanded(arm: Arm, runs: Sequence[RigRun]) -> tuple[Arm, tuple[RigRun, ...]]:

@@ -30,8 +30,9 @@ from tfarm.arrays import Complex, Real
 from tfarm.errors import ParameterError
 from tfarm.fitting.data import CONFIDENCE, in_parts
 from tfarm.fitting.model import Problem, penalize
+from tfarm.fitting.run_model import FitRun
 from tfarm.fitting.run_numbers import with_disturbance
-from tfarm.fitting.whiteness import chance_of_independent, chance_of_white
+from tfarm.fitting.whiteness import chance_of_independent, chance_of_white, least_of
 from tfarm.records import frozen
 from tfarm.schema import Quantity
 from tfarm.spectrum.table import first_frequency
@@ -184,6 +185,13 @@ class Solution:
         return tuple(np.split(self.residuals, ends)[:-1])
 
     @property
+    def of_runs(self) -> list[tuple[FitRun, Real]]:
+        """The runs, each with its residuals (outputs, n) over their deviations."""
+        own = self.parts[len(self.problem.responses) :]
+        pairs = zip(self.problem.runs, own, strict=True)
+        return [(each, residuals.reshape(len(each.sigma), -1)) for each, residuals in pairs]
+
+    @property
     def freedom(
         self,
     ) -> Annotated[
@@ -204,22 +212,17 @@ class Solution:
     @cached_property
     def chance_of_white(self) -> float:
         """The probability of residuals of the runs' outputs so far from white noise, of all outputs together."""
-        found: list[float] = []
-        of_runs = self.parts[len(self.problem.responses) :]
-        for each, residuals in zip(self.problem.runs, of_runs, strict=True):
-            found += map(chance_of_white, residuals.reshape(len(each.sigma), -1))
-        return min(1.0, len(found) * min(found, default=1.0))
+        return least_of([chance_of_white(e) for _, residuals in self.of_runs for e in residuals])
 
     @cached_property
     def chance_of_noise(self) -> float:
         """The probability of residuals of the runs so far from white ones that do not depend on what drove them."""
-        found: list[float] = []
-        of_runs = self.parts[len(self.problem.responses) :]
-        for each, residuals in zip(self.problem.runs, of_runs, strict=True):
-            driving = each.run.driving_changes
-            found += (chance_of_independent(e, driving) for e in residuals.reshape(len(each.sigma), -1))
-        independent = min(1.0, len(found) * min(found, default=1.0))
-        return min(1.0, 2 * min(self.chance_of_white, independent))
+        found = [
+            chance_of_independent(e, each.run.driving_changes)
+            for each, residuals in self.of_runs
+            for e in residuals
+        ]
+        return least_of([self.chance_of_white, least_of(found)])
 
     @property
     def misfit(self) -> float:
@@ -270,8 +273,8 @@ def solution_of_runs(problem: Problem, draws: int) -> Solution:
     """Return a least sum of squares over the starts of records of runs, each cut short first.
 
     The phase of a mode is off by its frequency's error times the time, so the first periods of a record have few
-    minima: a search goes on from them over longer and longer parts.  Frequency responses beside the runs give a start.
-    Where a controller reads what was recorded, the noise that fits better is taken (`run_model`).
+    minima: a search goes on from them over longer and longer parts.  Frequency responses give a start, too.  Where a
+    controller reads what was recorded, the noise that fits better is taken (`run_model`).
     """
     # of ln p, of draws about the start
     spread = 0.15

@@ -1,13 +1,11 @@
 """Whether what a model leaves of a record is noise: white, and independent of what drove the rig."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.special import chdtrc, fdtrc, kolmogorov
 
 from tfarm.arrays import Real
-
-# of a regression, and of autocorrelations
-MOST_LAGS = 40
-USUAL_LAGS = 20
 
 
 def chance_of_white(residuals: Real) -> float:
@@ -18,12 +16,8 @@ def chance_of_white(residuals: Real) -> float:
     """
     e = residuals - residuals.mean()
     n = e.size
-    lags = np.arange(1, min(USUAL_LAGS, n // 5) + 1)
-    total = float(e @ e)
-    if total == 0 or not lags.size:
+    if n < 5 or not e.any():
         return 1.0
-    r = np.array([e[lag:] @ e[:-lag] for lag in lags.tolist()]) / total
-    by_lags = float(chdtrc(lags.size, n * (n + 2) * (r**2 / (n - lags)).sum()))
     lines = abs(np.fft.rfft(e)[1 : (n + 1) // 2]) ** 2
     share = float(lines.max() / lines.sum())
     # the first term of Fisher's series: an upper bound, and the whole of it where it is small
@@ -31,7 +25,30 @@ def chance_of_white(residuals: Real) -> float:
     sums = np.cumsum(lines)[:-1] / lines.sum()
     off = float(abs(sums - np.arange(1, lines.size) / lines.size).max(initial=0.0))
     by_band = float(kolmogorov(np.sqrt(lines.size) * off))
-    return min(1.0, 3 * min(by_lags, by_line, by_band))
+    return least_of([chance_of_lags(e), by_line, by_band])
+
+
+def chance_of_lags(e: Real) -> float:
+    """Return the probability of first autocorrelations as large as these in white noise (Ljung and Box 1978)."""
+    r = autocovariance(e)
+    n = e.size
+    if r[0] == 0:
+        return 1.0
+    lags = np.arange(1, min(20, n // 5) + 1)
+    Q = n * (n + 2) * ((r[lags] / r[0]) ** 2 / (n - lags)).sum()
+    return float(chdtrc(lags.size, Q))
+
+
+def autocovariance(e: Real) -> Real:
+    """Return the autocovariances (n,) of noise (n,) of mean 0, from lag 0 on."""
+    from scipy.signal import correlate
+
+    return correlate(e, e)[e.size - 1 :] / e.size
+
+
+def least_of(chances: Sequence[float]) -> float:
+    """Return the least of some chances as that of all tests together (Bonferroni); 1 of none."""
+    return min(1.0, len(chances) * min(chances, default=1.0))
 
 
 def chance_of_independent(residuals: Real, driving: Real) -> float:
@@ -40,7 +57,7 @@ def chance_of_independent(residuals: Real, driving: Real) -> float:
     By the F test of a regression on its last 40 values: what a wrong linear model leaves is a response to its input.
     """
     n = residuals.size
-    lags = min(MOST_LAGS, n // 20)
+    lags = min(40, n // 20)
     columns = [np.ones(n)]
     for x in driving:
         columns += (np.r_[np.zeros(lag), x][:n] for lag in range(1, lags + 1))

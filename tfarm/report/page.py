@@ -211,7 +211,7 @@ class PageCase(OfCase):
 
     @property
     def prediction(self) -> Prediction | None:
-        """The measured run beside its prediction, if one was measured."""
+        """The measured run with its prediction, if one was measured."""
         found = self.measured
         if found is None:
             return None

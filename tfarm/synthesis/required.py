@@ -157,7 +157,6 @@ class RequirementTask:
         attempts = 2 if any(each.arm.has_elastic_link for each in named) else 8
         for attempt in range(attempts):
             judges = tuple(self.judge(each.arm, goal, step) for each in named)
-            worst = Worst(judges[::-1])
             share = 1.0
             size = 1.0
             if chosen is not None and chosen.violation < SMALL:
@@ -167,7 +166,7 @@ class RequirementTask:
                 # a simplex that is too large ends before it is as small as the correction
                 size = max(100 * chosen.violation, 1e-3)
             else:
-                found = search(worst, form, self.tell, near, effort if attempt == 0 else "near")
+                found = search(Worst(judges[::-1]), form, self.tell, near, effort if attempt == 0 else "near")
                 if attempt == 0 and effort == "whole" and found.found[0][0] < LOST:
                     least = found.found[0][0] + goal.below_models
                     found, share = _ranked_by_slews(goal, judges, found, least)
@@ -177,13 +176,7 @@ class RequirementTask:
                 break
             if effort == "sketch":
                 return RequiredLaw(Worst(judges), found, *found.found[0], law, goal, ())
-            candidates = (
-                self.examine(named, judges, found, x, goal, min(size, share), share)
-                for score, x in found.found
-                if score < LOST
-            )
-            # the best on the models may be unstable by a mode that they leave out
-            chosen = next((each for each in candidates if np.isfinite(each.violation)), None)
+            chosen = self._first_stable(named, judges, found, goal, min(size, share), share)
             if chosen is None:
                 step += 1
                 if step >= max(map(len, sizes)):
@@ -208,6 +201,20 @@ class RequirementTask:
         if best is None:
             raise ConvergenceError(why_none(named, form, law, self.chain, max(map(max, sizes))), law, None)
         return best
+
+    def _first_stable(
+        self,
+        named: Sequence[NamedArm],
+        judges: tuple[Judge, ...],
+        found: Search,
+        goal: Goal,
+        size: float,
+        share: float,
+    ) -> RequiredLaw | None:
+        """Return the best law of a search that is stable: the models may leave out a mode by which it is not."""
+        points = (x for score, x in found.found if score < LOST)
+        laws = (self.examine(named, judges, found, x, goal, size, share) for x in points)
+        return next((each for each in laws if np.isfinite(each.violation)), None)
 
     def examine(
         self,
